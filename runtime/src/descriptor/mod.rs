@@ -1,0 +1,1 @@
+//! Pointwise descriptors: SHOT-352, the input of the network.

@@ -1,0 +1,1 @@
+//! Evaluation of a point map against ground truth.

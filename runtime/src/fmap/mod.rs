@@ -1,0 +1,1 @@
+//! Functional maps: least squares, the regularised solve, soft correspondence.

@@ -1,0 +1,1 @@
+//! Geodesic distances on a triangle mesh.

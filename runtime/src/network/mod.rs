@@ -1,0 +1,1 @@
+//! The descriptor network: the model file's contract, and its back-ends.

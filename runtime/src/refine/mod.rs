@@ -1,0 +1,1 @@
+//! Refinement of a map: spectral ICP, ZoomOut, the product manifold filter.

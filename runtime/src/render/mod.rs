@@ -1,0 +1,1 @@
+//! Pictures and attributes: colours of a map, transfer, the HTML viewer.

@@ -1,0 +1,5 @@
+//! The Laplace-Beltrami operator and its eigenbasis.
+
+mod basis;
+
+pub use basis::Eigenbasis;

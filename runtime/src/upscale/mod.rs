@@ -1,0 +1,1 @@
+//! From the map of two decimated shapes to the map of the full ones.
