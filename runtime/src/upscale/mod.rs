@@ -1,1 +1,28 @@
-//! From the map of two decimated shapes to the map of the full ones.
+//! From the map of two decimated shapes to the map of the full ones (the paper's section "Upscaling").
+//!
+//! Every vertex of the decimated source gives a match between two vertices of the full shapes. The functional map of the
+//! full shapes that agrees best with these matches, [`l21_functional_map`], is then read off at every vertex by nearest
+//! neighbour. The l2,1 norm lets wrong matches stay wrong instead of bending the map towards them.
+
+mod l21_admm;
+mod least_squares;
+
+pub use l21_admm::{AdmmInfo, AdmmOptions, UpscaleError, l21_functional_map};
+pub use least_squares::least_squares_functional_map;
+
+use crate::Matrix;
+use crate::spectral::Eigenbasis;
+
+/// The values of the eigenfunctions at the matched vertices, `[m, k_source]` and `[m, k_target]`.
+///
+/// Row `j` holds the Fourier coefficients of the delta function at match `j`. A delta is given unit mass, so its coefficients
+/// are `phi(x_j)` without the vertex's area: the area of a single vertex is an accident of the tessellation, and every match
+/// shall count the same.
+pub fn delta_coefficients(
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    matches: &[(u32, u32)],
+) -> (Matrix, Matrix) {
+    let (sources, targets): (Vec<u32>, Vec<u32>) = matches.iter().copied().unzip();
+    (basis_source.eigenvectors.select_rows(&sources), basis_target.eigenvectors.select_rows(&targets))
+}

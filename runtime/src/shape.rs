@@ -1,0 +1,208 @@
+//! One shape, from the mesh as read to everything the matching needs of it.
+//!
+//! `repair -> decimate -> Laplacian -> eigenbasis -> SHOT`, in [`Shape::process`]. A shape keeps the index maps back to
+//! the input, so that every result can be given in the input's vertices.
+
+use crate::cache::{Cache, CacheKey, Decoder, Encoder, Lookup};
+use crate::descriptor::{ShotOptions, shot};
+use crate::error::Error;
+use crate::events::{Event, Observer, timed};
+use crate::mesh::{DecimateOptions, RepairOptions, decimate, repair};
+use crate::spectral::{Eigenbasis, EigenOptions, Laplacian, eigenbasis};
+use crate::{Matrix, Mesh};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`Shape::process`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapeOptions {
+    /// Meshes of more vertices than this are decimated to it; `None`: never. Default 15000, as in the paper.
+    pub decimate: Option<usize>,
+    /// Number of eigenpairs. Range 1 to 500, default 120.
+    pub k: usize,
+    /// Settings of the SHOT descriptor.
+    pub shot: ShotOptions,
+}
+
+impl Default for ShapeOptions {
+    fn default() -> Self {
+        Self { decimate: Some(15_000), k: 120, shot: ShotOptions::default() }
+    }
+}
+
+/// A repaired, possibly decimated shape with its eigenbasis and SHOT descriptors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Name for messages: the file's name, or what the caller chose.
+    pub name: String,
+    /// Number of vertices of the input mesh.
+    pub n_input: usize,
+    /// The repaired mesh at full resolution, `[n_full]` vertices.
+    pub full_mesh: Mesh,
+    /// Input vertex of each vertex of `full_mesh`, `[n_full]`.
+    pub input_of_full: Vec<u32>,
+    /// For each input vertex its vertex in `full_mesh`, [`Shape::NONE`] where repair dropped it, `[n_input]`.
+    pub full_of_input: Vec<u32>,
+    /// The decimated mesh and, for each of its vertices, the vertex of `full_mesh`; absent for small meshes.
+    pub decimated: Option<(Mesh, Vec<u32>)>,
+    /// Eigenbasis of the working mesh.
+    pub basis: Eigenbasis,
+    /// SHOT descriptors of the working mesh, `[n, 352]`.
+    pub shot: Matrix<f32>,
+}
+
+impl Shape {
+    /// Stands in index maps for "no such vertex".
+    pub const NONE: u32 = u32::MAX;
+
+    /// Runs every stage on a mesh as read.
+    pub fn process(name: &str, mesh: &Mesh, options: &ShapeOptions, observer: Observer) -> Result<Self, Error> {
+        let in_shape = |e: Error| e.in_shape(name);
+        let repaired = timed(observer, name, "repair", || repair(mesh, &RepairOptions::default()))
+            .map_err(|e| in_shape(e.into()))?;
+        let full_mesh = repaired.mesh;
+        let decimated = match options.decimate {
+            Some(target) if full_mesh.n_vertices() > target => {
+                let result = timed(observer, name, "decimate", || {
+                    decimate(&full_mesh, target, &DecimateOptions::default())
+                })
+                .map_err(|e| in_shape(e.into()))?;
+                Some((result.mesh, result.injection))
+            }
+            _ => None,
+        };
+        let work = decimated.as_ref().map_or(&full_mesh, |(mesh, _)| mesh);
+        let (basis, _) = timed(observer, name, "eigenbasis", || {
+            eigenbasis(&Laplacian::new(work), options.k, &EigenOptions::default())
+        })
+        .map_err(|e| in_shape(e.into()))?;
+        let (shot, info) =
+            timed(observer, name, "shot", || shot(work, &options.shot)).map_err(|e| in_shape(e.into()))?;
+        if info.zero_rows > work.n_vertices() / 10 {
+            observer(Event::Warning(format!(
+                "{name}: {} of {} vertices have too few neighbours for a descriptor; a larger SHOT radius may help",
+                info.zero_rows,
+                work.n_vertices()
+            )));
+        }
+        Ok(Self {
+            name: name.to_string(),
+            n_input: mesh.n_vertices(),
+            input_of_full: repaired.input_of_repaired,
+            full_of_input: repaired.repaired_of_input.iter().map(|v| v.unwrap_or(Self::NONE)).collect(),
+            full_mesh,
+            decimated,
+            basis,
+            shot,
+        })
+    }
+
+    /// As [`Shape::process`], but looks into the cache first and leaves the result there.
+    pub fn process_cached(
+        name: &str,
+        mesh: &Mesh,
+        options: &ShapeOptions,
+        cache: Option<&Cache>,
+        observer: Observer,
+    ) -> Result<Self, Error> {
+        let Some(cache) = cache else { return Self::process(name, mesh, options, observer) };
+        let key = Self::cache_key(mesh, options);
+        match timed(observer, name, "cache", || cache.get("shape", key)) {
+            Lookup::Hit(bytes) => match Self::decode(name, &bytes) {
+                Some(shape) => return Ok(shape),
+                None => observer(Event::Warning(format!(
+                    "{}: cache entry of another layout, computed again",
+                    cache.path("shape", key).display()
+                ))),
+            },
+            Lookup::Damaged(reason) => {
+                observer(Event::Warning(format!("damaged cache entry, computed again: {reason}")));
+            }
+            Lookup::Miss => {}
+        }
+        let shape = Self::process(name, mesh, options, observer)?;
+        cache.put("shape", key, &shape.encode())?;
+        Ok(shape)
+    }
+
+    /// The key of a shape: the mesh's content and the options.
+    pub fn cache_key(mesh: &Mesh, options: &ShapeOptions) -> CacheKey {
+        let options = serde_json::to_vec(options).expect("plain data serialises");
+        CacheKey::of(&[
+            bytemuck::cast_slice(mesh.vertices()),
+            bytemuck::cast_slice(mesh.faces()),
+            &options,
+            env!("CARGO_PKG_VERSION").as_bytes(),
+        ])
+    }
+
+    /// The mesh that basis and descriptors live on: the decimated one, or the full one.
+    pub fn mesh(&self) -> &Mesh {
+        self.decimated.as_ref().map_or(&self.full_mesh, |(mesh, _)| mesh)
+    }
+
+    /// Number of vertices of the working mesh.
+    pub fn n(&self) -> usize {
+        self.mesh().n_vertices()
+    }
+
+    /// Vertex of `full_mesh` of a vertex of the working mesh.
+    pub fn full_of_work(&self, vertex: u32) -> u32 {
+        self.decimated.as_ref().map_or(vertex, |(_, injection)| injection[vertex as usize])
+    }
+
+    /// For each input vertex its vertex of the working mesh, [`Shape::NONE`] where it has none, `[n_input]`.
+    pub fn work_of_input(&self) -> Vec<u32> {
+        let Some((_, injection)) = &self.decimated else { return self.full_of_input.clone() };
+        let mut work_of_full = vec![Self::NONE; self.full_mesh.n_vertices()];
+        for (work, &full) in injection.iter().enumerate() {
+            work_of_full[full as usize] = work as u32;
+        }
+        let work_of = |&full: &u32| work_of_full.get(full as usize).copied().unwrap_or(Self::NONE);
+        self.full_of_input.iter().map(work_of).collect()
+    }
+
+    /// Eigenvalues times the area of the shape: free of the unit, `[k]`.
+    pub fn unitless_eigenvalues(&self) -> Vec<f64> {
+        let area: f64 = self.basis.mass.iter().sum();
+        self.basis.eigenvalues.iter().map(|lambda| lambda * area).collect()
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut out = Encoder::default();
+        out.value(self.n_input as u64);
+        encode_mesh(&mut out, &self.full_mesh);
+        out.slice(&self.input_of_full).slice(&self.full_of_input);
+        out.value(u8::from(self.decimated.is_some()));
+        if let Some((mesh, injection)) = &self.decimated {
+            encode_mesh(&mut out, mesh);
+            out.slice(injection);
+        }
+        out.slice(&self.basis.eigenvalues).matrix(&self.basis.eigenvectors).slice(&self.basis.mass);
+        out.matrix(&self.shot);
+        out.finish()
+    }
+
+    fn decode(name: &str, bytes: &[u8]) -> Option<Self> {
+        let mut input = Decoder::new(bytes);
+        let n_input = usize::try_from(input.value::<u64>()?).ok()?;
+        let full_mesh = decode_mesh(&mut input)?;
+        let (input_of_full, full_of_input) = (input.slice()?, input.slice()?);
+        let decimated = match input.value::<u8>()? {
+            0 => None,
+            _ => Some((decode_mesh(&mut input)?, input.slice()?)),
+        };
+        let basis =
+            Eigenbasis { eigenvalues: input.slice()?, eigenvectors: input.matrix()?, mass: input.slice()? };
+        let shot = input.matrix()?;
+        let name = name.to_string();
+        Some(Self { name, n_input, full_mesh, input_of_full, full_of_input, decimated, basis, shot })
+    }
+}
+
+fn encode_mesh(out: &mut Encoder, mesh: &Mesh) {
+    out.slice(mesh.vertices()).slice(mesh.faces());
+}
+
+fn decode_mesh(input: &mut Decoder) -> Option<Mesh> {
+    Mesh::new(input.slice()?, input.slice()?).ok()
+}

@@ -1,0 +1,174 @@
+//! Datasets: shapes on disk, which of them correspond, and how they are split.
+//!
+//! [`Dataset::open`] recognises the layouts of FAUST (registrations, remeshed, scans), SCAPE, TOSCA and SHREC'16
+//! partial, and any folder with a `dataset.toml` ([`manifest`]). Whatever the layout, the result is the same: shapes in
+//! groups, and for each shape the vertex of every *point* of its group. Shapes of one group correspond point by point.
+
+mod layouts;
+pub mod manifest;
+mod shrec16;
+
+use fmnet::Mesh;
+use fmnet::io::{IoError, read_mesh, read_point_map};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Which part of a dataset a shape belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// Gradients are taken on it.
+    Train,
+    /// Settings are chosen on it.
+    Validation,
+    /// Results are reported on it.
+    Test,
+}
+
+/// How the points of a group lie on a shape.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Correspondence {
+    /// Point `i` is vertex `i`, for all vertices.
+    Identity,
+    /// Point `i` is vertex `i` for the first so many vertices; the others are no points.
+    First(usize),
+    /// Line `i` of a `.vts` file holds the 1-based vertex of point `i`, 0 where the shape lacks it.
+    Vts(PathBuf),
+    /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place.
+    NearestTo(PathBuf),
+    /// Line `v` of a SHREC'16 `.baryc_gt` file says where vertex `v` lies on the whole shape (the second path).
+    Barycentric(PathBuf, PathBuf),
+}
+
+/// A shape of a dataset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeEntry {
+    /// Unique name, the stem of the file where possible.
+    pub name: String,
+    /// The mesh file.
+    pub mesh: PathBuf,
+    /// Shapes of one group correspond with each other.
+    pub group: String,
+    /// Where the group's points lie on it.
+    pub correspondence: Correspondence,
+    /// Its part of the dataset.
+    pub split: Split,
+    /// Whether the shape is a part of a whole: it may be a source, never a target.
+    pub partial: bool,
+}
+
+/// All shapes of a dataset, in a fixed order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dataset {
+    /// The layout that was recognised, for messages.
+    pub layout: &'static str,
+    /// The folder.
+    pub folder: PathBuf,
+    /// Its shapes, sorted by name.
+    pub shapes: Vec<ShapeEntry>,
+}
+
+/// Why a dataset cannot be used.
+#[derive(Debug, Error)]
+pub enum DatasetError {
+    /// The folder has no known layout.
+    #[error(
+        "{folder}: no known dataset layout; expected tr_reg_NNN.ply (FAUST registrations), tr_reg_NNN.off with corres/*.vts \
+         (FAUST remeshed), scans/ and registrations/ (FAUST scans), meshNNN.off (SCAPE), CLASSn.off (TOSCA), null/ with \
+         holes/ or cuts/ (SHREC'16 partial), or a dataset.toml"
+    )]
+    UnknownLayout {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// The folder or a file in it cannot be read.
+    #[error("{path}: {source}")]
+    Folder {
+        /// What could not be read.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A mesh or correspondence file is wrong.
+    #[error(transparent)]
+    File(#[from] IoError),
+    /// The manifest is wrong.
+    #[error("{path}: {reason}")]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong, and where.
+        reason: String,
+    },
+    /// A correspondence does not fit its mesh.
+    #[error("{path}: {reason}")]
+    Correspondence {
+        /// The correspondence file.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+    },
+}
+
+/// Stands in [`ShapeEntry::points`] for a point that the shape lacks.
+pub const MISSING: u32 = u32::MAX;
+
+impl Dataset {
+    /// Recognises the layout of a folder.
+    pub fn open(folder: &Path) -> Result<Self, DatasetError> {
+        let manifest = folder.join(manifest::FILE_NAME);
+        let (layout, mut shapes) = if manifest.is_file() {
+            ("manifest", manifest::read(&manifest)?)
+        } else if let Some(found) = layouts::recognise(folder)? {
+            found
+        } else {
+            return Err(DatasetError::UnknownLayout { folder: folder.to_path_buf() });
+        };
+        shapes.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(Self { layout, folder: folder.to_path_buf(), shapes })
+    }
+
+    /// The shapes of the given splits.
+    pub fn of_splits<'a>(&'a self, splits: &'a [Split]) -> impl Iterator<Item = &'a ShapeEntry> {
+        self.shapes.iter().filter(|shape| splits.contains(&shape.split))
+    }
+}
+
+impl ShapeEntry {
+    /// Reads the mesh.
+    pub fn read(&self) -> Result<Mesh, DatasetError> {
+        Ok(read_mesh(&self.mesh)?.mesh)
+    }
+
+    /// The vertex of `mesh` of every point of the group, [`MISSING`] where the shape lacks it.
+    pub fn points(&self, mesh: &Mesh) -> Result<Vec<u32>, DatasetError> {
+        let n = mesh.n_vertices();
+        match &self.correspondence {
+            Correspondence::Identity => Ok((0..n as u32).collect()),
+            Correspondence::First(count) if *count <= n => Ok((0..*count as u32).collect()),
+            Correspondence::First(count) => Err(DatasetError::Correspondence {
+                path: self.mesh.clone(),
+                reason: format!("{n} vertices, but the first {count} should correspond"),
+            }),
+            Correspondence::Vts(path) => vts_points(path, n),
+            Correspondence::NearestTo(path) => {
+                let template = read_mesh(path)?.mesh;
+                Ok(fmnet::mesh::nearest_vertices(mesh.vertices(), template.vertices()))
+            }
+            Correspondence::Barycentric(path, whole) => shrec16::points(path, whole),
+        }
+    }
+}
+
+fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
+    let map = read_point_map(path)?;
+    let points: Vec<u32> = (0..map.len()).map(|i| map.get(i).unwrap_or(MISSING)).collect();
+    match points.iter().position(|&v| v != MISSING && v as usize >= n) {
+        None => Ok(points),
+        Some(line) => Err(DatasetError::Correspondence {
+            path: path.to_path_buf(),
+            reason: format!("line {}: vertex {}, but the mesh has {n} vertices", line + 1, points[line] + 1),
+        }),
+    }
+}
