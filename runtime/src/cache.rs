@@ -5,6 +5,7 @@
 //! [`Lookup::Damaged`] and computed again. Entries are written to a temporary name and renamed, so two processes may
 //! share a folder: the last one to finish wins, with the same bytes.
 
+use crate::events::{Event, Observer};
 use crate::io::{IoError, write_atomically};
 use bytemuck::Pod;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ impl CacheKey {
     }
 
     /// The key as bytes, to derive another key from.
-    pub fn as_bytes(&self) -> &[u8] {
+    pub fn as_bytes(&self) -> &[u8; 32] {
         &self.0
     }
 
@@ -59,7 +60,7 @@ pub struct Cache {
 impl Cache {
     /// Opens the folder, which is created if absent.
     pub fn open(folder: &Path) -> Result<Self, IoError> {
-        std::fs::create_dir_all(folder).map_err(|source| IoError::write(folder, source))?;
+        std::fs::create_dir_all(folder).map_err(|source| IoError::Write { path: folder.into(), source })?;
         Ok(Self { folder: folder.to_path_buf() })
     }
 
@@ -78,6 +79,18 @@ impl Cache {
                 Ok(payload) => Lookup::Hit(payload),
                 Err(reason) => Lookup::Damaged(format!("{}: {reason}", path.display())),
             },
+        }
+    }
+
+    /// Reads an entry; a damaged one is reported and counts as absent, so that it is computed and written again.
+    pub fn fetch(&self, kind: &str, key: CacheKey, observer: Observer) -> Option<Vec<u8>> {
+        match self.get(kind, key) {
+            Lookup::Hit(bytes) => Some(bytes),
+            Lookup::Miss => None,
+            Lookup::Damaged(reason) => {
+                observer(Event::Warning(format!("damaged cache entry, computed again: {reason}")));
+                None
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 //! `repair -> decimate -> Laplacian -> eigenbasis -> SHOT`, in [`Shape::process`]. A shape keeps the index maps back to
 //! the input, so that every result can be given in the input's vertices.
 
-use crate::cache::{Cache, CacheKey, Decoder, Encoder, Lookup};
+use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::descriptor::{ShotOptions, shot};
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
@@ -106,18 +106,9 @@ impl Shape {
     ) -> Result<Self, Error> {
         let Some(cache) = cache else { return Self::process(name, mesh, options, observer) };
         let key = Self::cache_key(mesh, options);
-        match timed(observer, name, "cache", || cache.get("shape", key)) {
-            Lookup::Hit(bytes) => match Self::decode(name, &bytes) {
-                Some(shape) => return Ok(shape),
-                None => observer(Event::Warning(format!(
-                    "{}: cache entry of another layout, computed again",
-                    cache.path("shape", key).display()
-                ))),
-            },
-            Lookup::Damaged(reason) => {
-                observer(Event::Warning(format!("damaged cache entry, computed again: {reason}")));
-            }
-            Lookup::Miss => {}
+        let found = timed(observer, name, "cache", || cache.fetch("shape", key, observer));
+        if let Some(shape) = found.and_then(|bytes| Self::decode(name, &bytes)) {
+            return Ok(shape);
         }
         let shape = Self::process(name, mesh, options, observer)?;
         cache.put("shape", key, &shape.encode())?;

@@ -1,1 +1,11 @@
-//! Pictures and attributes: colours of a map, transfer, the HTML viewer.
+//! Pictures and attributes: colours of a map, the coloured pair, transfer, the HTML viewer.
+
+mod colormap;
+mod pair;
+mod transfer;
+mod viewer;
+
+pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
+pub use pair::side_by_side;
+pub use transfer::{Donors, transfer_attributes, transfer_landmarks, transfer_values};
+pub use viewer::{ViewerPair, viewer_html};

@@ -1,0 +1,312 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use fmnet::fmap::FmapSolver;
+use fmnet::network::Backend;
+use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
+use std::path::PathBuf;
+
+/// Dense correspondence between deformable 3D shapes: two meshes in, a map out.
+///
+/// A map gives every vertex of the source a vertex of the target. Meshes may be OFF, PLY, OBJ, glTF, GLB or STL, in any unit,
+/// with holes, several components and other defects; results are always in the vertices of the files as they are.
+///
+/// Exit status: 0 success, 2 bad usage or bad input, 1 a failure of the program.
+#[derive(Debug, Parser)]
+#[command(name = "fmnet-infer", version, max_term_width = 110)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Common {
+    /// Threads to use; the result does not depend on it [default: all cores]
+    #[arg(long, global = true, value_parser = positive)]
+    pub(crate) threads: Option<usize>,
+    /// Say nothing but warnings and errors
+    #[arg(long, global = true)]
+    pub(crate) quiet: bool,
+    /// Print a summary for scripts on standard output: sizes, settings, seconds of every stage
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Match two built-in shapes, print the error against exact ground truth, write a viewer
+    Demo(DemoArgs),
+    /// Match two meshes
+    Match(MatchArgs),
+    /// Match many pairs; each shape is processed once, and an interrupted run goes on where it was
+    Batch(BatchArgs),
+    /// Carry colours, texture coordinates, scalar fields, landmarks or skin weights over a map
+    Transfer(TransferArgs),
+    /// Write eigenvalues, eigenvectors, vertex areas and descriptors of a mesh as .npy files
+    Features(FeaturesArgs),
+    /// Compare a map with ground truth: mean geodesic error, error curve
+    Evaluate(EvaluateArgs),
+    /// Say what a mesh or a model is, what is wrong with it and what would be repaired
+    Inspect(InspectArgs),
+}
+
+/// Options that decide how shapes are processed and matched.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PipelineArgs {
+    /// Model file, or the name of one in ./models [default: the model built into this program]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) model: Option<String>,
+    /// What computes the network; ort needs the feature `ort` and the library named by ORT_DYLIB_PATH
+    #[arg(long, value_enum, default_value = "tract")]
+    pub(crate) backend: BackendArg,
+    /// Learned descriptors, or SHOT without a network (the paper's baseline)
+    #[arg(long, value_enum, default_value = "learned")]
+    pub(crate) descriptor: DescriptorArg,
+    /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
+    #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub(crate) k: Option<u16>,
+    /// Solver of the functional map [default: the model's; least-squares with SHOT]
+    #[arg(long, value_enum)]
+    pub(crate) fm: Option<SolverArg>,
+    /// Weight of the mask of the regularised solver, 0 and up; more suits shapes of unlike connectivity
+    /// [default: the model's, or 0.1]
+    #[arg(long, value_parser = non_negative)]
+    pub(crate) mask_weight: Option<f64>,
+    /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
+    #[arg(long, value_name = "N|off", value_parser = decimation)]
+    pub(crate) decimate: Option<Decimation>,
+    /// Refinement of the map [default: zoomout; none with SHOT]
+    #[arg(long, value_enum)]
+    pub(crate) refine: Option<RefineArg>,
+    /// How the map of decimated meshes becomes one of the full meshes
+    #[arg(long, value_enum, default_value = "l21")]
+    pub(crate) upscale: UpscaleArg,
+    /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.0673 with SHOT]
+    #[arg(long, value_parser = radius)]
+    pub(crate) shot_radius: Option<f64>,
+    /// Keep what is computed of each shape in this folder, and use what is there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Where the viewer is written
+    #[arg(short, long, value_name = "FILE.html", default_value = "fmnet-demo.html")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MatchArgs {
+    /// Mesh whose vertices are to be matched
+    pub(crate) source: PathBuf,
+    /// Mesh that they are matched to
+    pub(crate) target: PathBuf,
+    /// Output; may be given several times. The extension decides: .txt (one 0-based target vertex a line, -1 where
+    /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence), .ply or .glb (both meshes side by
+    /// side, coloured alike where they match), .html (viewer)
+    #[arg(short, long = "output", value_name = "MAP", required = true)]
+    pub(crate) outputs: Vec<PathBuf>,
+    /// Write the functional map, [k of target, k of source]
+    #[arg(long, value_name = "FILE.npy")]
+    pub(crate) save_functional_map: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pipeline: PipelineArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BatchArgs {
+    /// Text file with a pair of mesh files a line, separated by white space or a tab; # begins a comment
+    pub(crate) pairs: PathBuf,
+    /// Folder for the maps, SOURCE__TARGET.EXT; pairs whose map is there already are skipped
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Format of the maps
+    #[arg(long, value_name = "EXT", default_value = "txt", value_parser = ["txt", "vts", "npy", "csv"])]
+    pub(crate) format: String,
+    /// Folder that mesh files are relative to [default: that of the list]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) root: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) pipeline: PipelineArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TransferArgs {
+    /// Source mesh of the map
+    pub(crate) source: PathBuf,
+    /// Target mesh of the map
+    pub(crate) target: PathBuf,
+    /// The map: for each source vertex a target vertex (.txt, .vts, .npy or .csv)
+    #[arg(long)]
+    pub(crate) map: PathBuf,
+    /// Which mesh receives. `source` takes from the target what each vertex is matched to. `target` takes from the
+    /// source: each vertex from the source vertex whose match is nearest
+    #[arg(long, value_enum, default_value = "source")]
+    pub(crate) to: Receiver,
+    /// Per-vertex values of the giving mesh to carry over as well: scalar fields or skin weights [n] or [n, q] (.npy),
+    /// or landmarks (.txt, a 0-based vertex a line)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) values: Vec<PathBuf>,
+    /// Output: a mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file; or, for each --values
+    /// in turn, a file of the same kind
+    #[arg(short, long = "output", required = true)]
+    pub(crate) outputs: Vec<PathBuf>,
+}
+
+/// The mesh that receives attributes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Receiver {
+    Source,
+    Target,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FeaturesArgs {
+    /// The mesh
+    pub(crate) mesh: PathBuf,
+    /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], shot.npy [n,352] and, with learned
+    /// descriptors, descriptors.npy [n,352]; where the mesh was repaired or decimated so that vertices differ from the
+    /// file's, also vertices.npy [n]: the file's vertex of each row
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) pipeline: PipelineArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Maps to evaluate, of the same pair; several are drawn into one plot
+    #[arg(required = true)]
+    pub(crate) maps: Vec<PathBuf>,
+    /// Source mesh
+    #[arg(long)]
+    pub(crate) source: PathBuf,
+    /// Target mesh
+    #[arg(long)]
+    pub(crate) target: PathBuf,
+    /// `identity` (vertex i corresponds with vertex i), a map file, or two .vts files separated by a comma (line i of the
+    /// one corresponds with line i of the other)
+    #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
+    pub(crate) ground_truth: String,
+    /// Second ground truth, the left-right mirrored one; the better of the two counts
+    #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
+    pub(crate) symmetric_ground_truth: Option<String>,
+    /// Output: .csv (curve) or .svg (plot); may be given several times
+    #[arg(short, long = "output")]
+    pub(crate) outputs: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// A mesh file, or a model (.onnx)
+    pub(crate) file: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BackendArg {
+    Tract,
+    Ort,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DescriptorArg {
+    Learned,
+    Shot,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SolverArg {
+    LeastSquares,
+    Regularized,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RefineArg {
+    None,
+    Icp,
+    Zoomout,
+    Pmf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum UpscaleArg {
+    L21,
+    LeastSquares,
+}
+
+/// `--decimate`: a number of vertices, or never.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Decimation(pub(crate) Option<usize>);
+
+fn decimation(text: &str) -> Result<Decimation, String> {
+    match text {
+        "off" => Ok(Decimation(None)),
+        _ => match text.parse() {
+            Ok(n) if n >= 100 => Ok(Decimation(Some(n))),
+            _ => Err("expected a number of vertices, 100 or more, or `off`".into()),
+        },
+    }
+}
+
+fn positive(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected 1 or more".into())
+}
+
+fn non_negative(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite() && *x >= 0.0).ok_or_else(|| "expected 0 or more".into())
+}
+
+fn radius(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|&x| x > 0.0 && x < 1.0).ok_or_else(|| "expected a number between 0 and 1".into())
+}
+
+impl PipelineArgs {
+    /// The library's options.
+    pub(crate) fn to_options(&self) -> MatchOptions {
+        MatchOptions {
+            descriptor: match self.descriptor {
+                DescriptorArg::Learned => DescriptorKind::Learned,
+                DescriptorArg::Shot => DescriptorKind::Shot,
+            },
+            model: self.model.as_deref().map_or(ModelSource::Embedded, |m| ModelSource::File(model_path(m))),
+            backend: match self.backend {
+                BackendArg::Tract => Backend::Tract,
+                BackendArg::Ort => Backend::Ort,
+            },
+            k: self.k.map(usize::from),
+            solver: self.solver(),
+            shot_radius: self.shot_radius,
+            decimate: self.decimate.map(|d| d.0),
+            refinement: self.refine.map(|r| match r {
+                RefineArg::None => Refinement::None,
+                RefineArg::Icp => Refinement::Icp,
+                RefineArg::Zoomout => Refinement::Zoomout,
+                RefineArg::Pmf => Refinement::ProductManifold,
+            }),
+            upscaling: match self.upscale {
+                UpscaleArg::L21 => Upscaling::L21,
+                UpscaleArg::LeastSquares => Upscaling::LeastSquares,
+            },
+            cache: self.cache.clone(),
+        }
+    }
+
+    fn solver(&self) -> Option<FmapSolver> {
+        let weight = self.mask_weight.unwrap_or(FmapSolver::DEFAULT_MASK_WEIGHT);
+        match (self.fm, self.mask_weight) {
+            (Some(SolverArg::LeastSquares), _) => Some(FmapSolver::LeastSquares),
+            (Some(SolverArg::Regularized), _) | (None, Some(_)) => Some(FmapSolver::Regularized { weight }),
+            (None, None) => None,
+        }
+    }
+}
+
+/// A path, or the name of a model in `./models`.
+fn model_path(model: &str) -> PathBuf {
+    let named = PathBuf::from("models").join(model).join("model.onnx");
+    if !model.ends_with(".onnx") && named.is_file() { named } else { PathBuf::from(model) }
+}

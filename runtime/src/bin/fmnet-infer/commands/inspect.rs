@@ -1,0 +1,38 @@
+//! `fmnet-infer inspect`: what a mesh or a model is, and what is wrong with it.
+
+use super::output::file_name;
+use crate::args::InspectArgs;
+use crate::console::Console;
+use anyhow::{Context, Result};
+use fmnet::io::read_mesh;
+use fmnet::mesh::inspect;
+use fmnet::network::contract::read_contract;
+use serde_json::json;
+use std::path::Path;
+
+pub(crate) fn run(args: &InspectArgs, console: &Console) -> Result<()> {
+    if args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("onnx")) {
+        inspect_model(&args.file, console)
+    } else {
+        inspect_mesh(&args.file, console)
+    }
+}
+
+fn inspect_mesh(path: &Path, console: &Console) -> Result<()> {
+    let file = read_mesh(path)?;
+    for warning in &file.info.warnings {
+        console.warn(&format!("{}: {warning}", path.display()));
+    }
+    let report = inspect(&file.mesh);
+    console.result(&format!("{}\n{report}", file_name(path)), json!({ "file": path, "report": report }));
+    Ok(())
+}
+
+fn inspect_model(path: &Path, console: &Console) -> Result<()> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let metadata = read_contract(path, &bytes)?;
+    let lines: Vec<String> = metadata.to_pairs().iter().map(|(key, value)| format!("  {key}: {value}")).collect();
+    let text = format!("{}: a descriptor network of fmnet\n{}", file_name(path), lines.join("\n"));
+    console.result(&text, json!({ "file": path, "metadata": metadata }));
+    Ok(())
+}

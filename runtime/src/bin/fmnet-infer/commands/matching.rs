@@ -1,0 +1,77 @@
+//! `fmnet-infer match`: the map of one pair.
+
+use super::output::{self, MapOutput, file_name};
+use crate::args::MatchArgs;
+use crate::console::Console;
+use anyhow::Result;
+use fmnet::io::{read_mesh, write_matrix};
+use fmnet::pipeline::{Match, Matcher};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::Instant;
+
+pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
+    output::check(&args.outputs)?;
+    let start = Instant::now();
+    let observer = |event| console.event(event);
+    let matcher = Matcher::new(&args.pipeline.to_options())?;
+    let source = read(&args.source, console)?;
+    let target = read(&args.target, console)?;
+    let (name_source, name_target) = (file_name(&args.source), file_name(&args.target));
+    let (described_source, described_target) = rayon::join(
+        || matcher.describe(&name_source, &source, &observer),
+        || matcher.describe(&name_target, &target, &observer),
+    );
+    let result = matcher.match_shapes(&described_source?, &described_target?, &observer)?;
+    let text = summary_text(&result, start.elapsed().as_secs_f64());
+    for path in &args.outputs {
+        let (map, caption) = (&result.map, text.as_str());
+        let (source, target) = (&source, &target);
+        let (name_source, name_target) = (name_source.as_str(), name_target.as_str());
+        output::write(path, &MapOutput { source, target, name_source, name_target, map, caption })?;
+    }
+    if let Some(path) = &args.save_functional_map {
+        write_matrix(path, &result.functional_map)?;
+    }
+    let mut summary = summary(&matcher, &result);
+    summary["source"] = json!({ "file": args.source, "vertices": source.n_vertices(), "faces": source.n_faces() });
+    summary["target"] = json!({ "file": args.target, "vertices": target.n_vertices(), "faces": target.n_faces() });
+    summary["outputs"] = json!(args.outputs);
+    summary["seconds"] = json!(start.elapsed().as_secs_f64());
+    console.result(&text, summary);
+    Ok(())
+}
+
+/// Reads a mesh and passes on what its reader has to say.
+pub(super) fn read(path: &Path, console: &Console) -> Result<fmnet::Mesh> {
+    let file = read_mesh(path)?;
+    for warning in &file.info.warnings {
+        console.warn(&format!("{}: {warning}", path.display()));
+    }
+    Ok(file.mesh)
+}
+
+fn summary_text(result: &Match, seconds: f64) -> String {
+    let matched = result.map.iter().flatten().count();
+    format!("{matched} of {} source vertices matched in {seconds:.2} s", result.map.len())
+}
+
+/// Settings and outcome of a match, for scripts.
+pub(super) fn summary(matcher: &Matcher, result: &Match) -> Value {
+    let info = &result.functional_map_info;
+    let upscale = result.upscale_info.as_ref().map(|info| {
+        json!({ "iterations": info.iterations, "converged": info.converged, "objective": info.objective,
+                "initial_objective": info.initial_objective })
+    });
+    json!({
+        "matched": result.map.iter().flatten().count(),
+        "n_source": result.map.len(),
+        "n_target": result.map.n_target,
+        "k": matcher.k(),
+        "shape_options": matcher.shape_options(),
+        "model": matcher.network().map(|n| n.metadata()),
+        "backend": matcher.network().map(|n| n.backend()),
+        "functional_map": { "rank": info.rank, "condition": info.condition },
+        "upscale": upscale,
+    })
+}

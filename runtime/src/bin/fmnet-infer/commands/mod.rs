@@ -1,0 +1,10 @@
+//! One file for each command.
+
+pub(crate) mod batch;
+pub(crate) mod demo;
+pub(crate) mod evaluate;
+pub(crate) mod features;
+pub(crate) mod inspect;
+pub(crate) mod matching;
+mod output;
+pub(crate) mod transfer;

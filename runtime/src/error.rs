@@ -1,0 +1,64 @@
+//! The error of the whole pipeline: the error of a stage, with the shape it happened on.
+
+use crate::descriptor::ShotError;
+use crate::fmap::FmapError;
+use crate::io::IoError;
+use crate::mesh::{DecimateError, MeshError, RepairError};
+use crate::network::NetworkError;
+use crate::refine::RefineError;
+use crate::spectral::EigenError;
+use crate::upscale::UpscaleError;
+use thiserror::Error;
+
+/// What can go wrong between two meshes and their map.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// Vertices and faces do not make a mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Nothing of the mesh is left after repair.
+    #[error(transparent)]
+    Repair(#[from] RepairError),
+    /// The mesh cannot be decimated.
+    #[error(transparent)]
+    Decimate(#[from] DecimateError),
+    /// The eigenbasis cannot be computed.
+    #[error(transparent)]
+    Eigen(#[from] EigenError),
+    /// The SHOT options are out of range.
+    #[error(transparent)]
+    Shot(#[from] ShotError),
+    /// The model cannot be loaded or run.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// The functional map cannot be computed.
+    #[error(transparent)]
+    Fmap(#[from] FmapError),
+    /// The map cannot be refined.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// The map cannot be upscaled.
+    #[error(transparent)]
+    Upscale(#[from] UpscaleError),
+    /// Options that do not go together.
+    #[error("{0}")]
+    Options(String),
+    /// Any of these, on a known shape.
+    #[error("{shape}: {source}")]
+    InShape {
+        /// The shape's name.
+        shape: String,
+        /// What happened.
+        source: Box<Error>,
+    },
+}
+
+impl Error {
+    /// The same error, naming the shape it happened on.
+    pub fn in_shape(self, shape: &str) -> Self {
+        Self::InShape { shape: shape.to_string(), source: Box::new(self) }
+    }
+}

@@ -1,0 +1,170 @@
+//! The contract of a model file: its graph's input and output, and what travels in `metadata_props`.
+//!
+//! Graph: input `shot`, float32 `[n, 352]`; output `descriptors`, float32 `[n, 352]`; `n` dynamic; standard operators only.
+//! Metadata: the keys of [`ModelMetadata::to_pairs`], all under the prefix `fmnet.`.
+
+use super::NetworkError;
+use super::proto::{Model, Type, ValueInfo};
+use crate::descriptor::ShotOptions;
+use crate::fmap::FmapSolver;
+use crate::shape::ShapeOptions;
+use prost::Message;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::str::FromStr;
+
+/// Width of input and output.
+pub const WIDTH: usize = 352;
+/// Name of the graph's input.
+pub const INPUT: &str = "shot";
+/// Name of the graph's output.
+pub const OUTPUT: &str = "descriptors";
+/// The newest format that this version reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+const PREFIX: &str = "fmnet.";
+const ONNX_FLOAT: i32 = 1;
+
+/// What the runtime must know of a model, and what people want to know of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelMetadata {
+    /// Format of the file, at most [`FORMAT_VERSION`].
+    pub format_version: u32,
+    /// The SHOT descriptor that the network was trained on.
+    pub shot: ShotOptions,
+    /// Number of eigenfunctions of the functional map.
+    pub k: usize,
+    /// Solver of the functional map.
+    pub solver: FmapSolver,
+    /// Meshes of more vertices are decimated to so many; `None`: never.
+    pub decimate: Option<usize>,
+    /// Whether the network takes statistics over all vertices of a shape, so that rows depend on each other.
+    pub per_shape_statistics: bool,
+    /// What it was trained on.
+    pub training_set: String,
+    /// Seed of the training.
+    pub seed: u64,
+    /// Minibatches of the training.
+    pub steps: u64,
+    /// Source revision that trained it.
+    pub commit: String,
+    /// Licence of the weights.
+    pub license: String,
+}
+
+impl ModelMetadata {
+    /// The settings of [`crate::shape::Shape::process`] that fit the model.
+    pub fn shape_options(&self) -> ShapeOptions {
+        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot.clone() }
+    }
+
+    /// As key-value pairs for `metadata_props`.
+    pub fn to_pairs(&self) -> Vec<(String, String)> {
+        let (solver, mask_weight) = match self.solver {
+            FmapSolver::LeastSquares => ("least-squares", 0.0),
+            FmapSolver::Regularized { weight } => ("regularized", weight),
+        };
+        let pairs = [
+            ("format_version", self.format_version.to_string()),
+            ("shot_radius", self.shot.radius.to_string()),
+            ("shot_bins", self.shot.bins.to_string()),
+            ("shot_min_neighbors", self.shot.min_neighbors.to_string()),
+            ("k", self.k.to_string()),
+            ("solver", solver.to_string()),
+            ("mask_weight", mask_weight.to_string()),
+            ("decimate", self.decimate.unwrap_or(0).to_string()),
+            ("per_shape_statistics", self.per_shape_statistics.to_string()),
+            ("training_set", self.training_set.clone()),
+            ("seed", self.seed.to_string()),
+            ("steps", self.steps.to_string()),
+            ("commit", self.commit.clone()),
+            ("license", self.license.clone()),
+        ];
+        pairs.into_iter().map(|(key, value)| (format!("{PREFIX}{key}"), value)).collect()
+    }
+
+    fn from_pairs(pairs: &Pairs) -> Result<Self, NetworkError> {
+        let format_version = pairs.value("format_version")?;
+        if format_version > FORMAT_VERSION {
+            return Err(pairs.contract(format!(
+                "the model has format {format_version}, this version reads up to {FORMAT_VERSION}; install a newer fmnet"
+            )));
+        }
+        let solver = match pairs.text("solver")? {
+            "least-squares" => FmapSolver::LeastSquares,
+            "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
+            other => return Err(pairs.contract(format!("unknown {PREFIX}solver {other:?}"))),
+        };
+        Ok(Self {
+            format_version,
+            shot: ShotOptions {
+                radius: pairs.value("shot_radius")?,
+                bins: pairs.value("shot_bins")?,
+                min_neighbors: pairs.value("shot_min_neighbors")?,
+            },
+            k: pairs.value("k")?,
+            solver,
+            decimate: Some(pairs.value("decimate")?).filter(|&n: &usize| n > 0),
+            per_shape_statistics: pairs.value("per_shape_statistics")?,
+            training_set: pairs.text("training_set")?.to_string(),
+            seed: pairs.value("seed")?,
+            steps: pairs.value("steps")?,
+            commit: pairs.text("commit")?.to_string(),
+            license: pairs.text("license")?.to_string(),
+        })
+    }
+}
+
+struct Pairs<'a> {
+    path: &'a Path,
+    values: BTreeMap<String, String>,
+}
+
+impl Pairs<'_> {
+    fn contract(&self, reason: String) -> NetworkError {
+        NetworkError::Contract { path: self.path.to_path_buf(), reason }
+    }
+
+    fn text(&self, key: &str) -> Result<&str, NetworkError> {
+        let key = format!("{PREFIX}{key}");
+        self.values.get(&key).map(String::as_str).ok_or_else(|| {
+            self.contract(format!("no {key} in the metadata; export the model with `fmnet-train export`"))
+        })
+    }
+
+    fn value<T: FromStr>(&self, key: &str) -> Result<T, NetworkError> {
+        let text = self.text(key)?;
+        text.parse().map_err(|_| self.contract(format!("{PREFIX}{key} is {text:?}, which does not parse")))
+    }
+}
+
+/// Checks a model file against the contract and reads its metadata. `path` is for messages.
+pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, NetworkError> {
+    let contract = |reason: String| NetworkError::Contract { path: path.to_path_buf(), reason };
+    let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file: {e}")))?;
+    let graph = model.graph.ok_or_else(|| contract("no graph in it; not an ONNX model".into()))?;
+    if let Some(opset) = model.opset_import.iter().find(|o| !o.domain.is_empty() && o.domain != "ai.onnx") {
+        return Err(contract(format!("operators of the domain {:?}; only standard ones are allowed", opset.domain)));
+    }
+    check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}")))?;
+    check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}")))?;
+    let values = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
+    ModelMetadata::from_pairs(&Pairs { path, values })
+}
+
+fn check_value(values: &[ValueInfo], name: &str) -> Result<(), String> {
+    let [value] = values else { return Err(format!("expected one, {name:?}, found {}", values.len())) };
+    if value.name != name {
+        return Err(format!("expected {name:?}, found {:?}", value.name));
+    }
+    let Some(Type { tensor: Some(tensor) }) = &value.kind else { return Err("not a tensor".into()) };
+    if tensor.elem_type != ONNX_FLOAT {
+        return Err(format!("expected float32 (element type 1), found element type {}", tensor.elem_type));
+    }
+    let dims: Vec<Option<i64>> = tensor.shape.iter().flat_map(|s| s.dim.iter().map(|d| d.value)).collect();
+    match dims.as_slice() {
+        [None | Some(0), Some(width)] if *width == WIDTH as i64 => Ok(()),
+        _ => Err(format!("expected the shape [n, {WIDTH}] with n dynamic, found {dims:?}")),
+    }
+}

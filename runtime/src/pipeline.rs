@@ -1,0 +1,350 @@
+//! The order of the stages at deployment: two meshes in, a dense map out.
+//!
+//! ```text
+//! each shape:  repair -> decimate -> eigenbasis -> SHOT            (Shape::process)
+//!              -> descriptor network                               (Matcher::describe)
+//! a pair:      functional map -> point map -> refine -> upscale    (Matcher::match_shapes)
+//!              -> the map in the input's vertices
+//! ```
+//!
+//! Refinement comes before upscaling: it needs many iterations, which are cheap on the decimated shapes.
+
+use crate::cache::{Cache, CacheKey, Decoder, Encoder};
+use crate::descriptor::ShotOptions;
+use crate::error::Error;
+use crate::events::{Event, Observer, timed};
+use crate::fmap::{FmapInfo, FmapSolver, functional_map};
+use crate::network::{Backend, DescriptorNetwork};
+use crate::point_map::{PointMap, recover};
+use crate::refine::{IcpOptions, ZoomOutOptions, icp, zoomout};
+use crate::shape::{Shape, ShapeOptions};
+use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
+use crate::upscale::{AdmmInfo, AdmmOptions, delta_coefficients, l21_functional_map, least_squares_functional_map};
+use crate::{Matrix, Mesh};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The pointwise descriptors that the functional map is computed from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DescriptorKind {
+    /// SHOT through the network of a model.
+    #[default]
+    Learned,
+    /// SHOT itself: the paper's baseline.
+    Shot,
+}
+
+/// What happens to the map of the working meshes before it is upscaled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refinement {
+    /// Nothing: the raw map.
+    None,
+    /// Spectral ICP (Ovsjanikov et al. 2012).
+    Icp,
+    /// ZoomOut (Melzi et al. 2019).
+    #[default]
+    Zoomout,
+}
+
+/// How the map of decimated meshes becomes one of the full meshes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Upscaling {
+    /// The robust l2,1 problem of the paper.
+    #[default]
+    L21,
+    /// Plain least squares, which wrong matches bend.
+    LeastSquares,
+}
+
+/// Which model computes the descriptors.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ModelSource {
+    /// The model built into the library.
+    #[default]
+    Embedded,
+    /// A model file.
+    File(PathBuf),
+}
+
+/// Settings of a [`Matcher`]. What is `None` comes from the model, or without one from the paper.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MatchOptions {
+    /// Learned descriptors, or SHOT.
+    pub descriptor: DescriptorKind,
+    /// The model, for learned descriptors.
+    pub model: ModelSource,
+    /// What computes the network.
+    pub backend: Backend,
+    /// Number of eigenfunctions of the functional map. Default: the model's; 120 for SHOT.
+    pub k: Option<usize>,
+    /// Solver of the functional map. Default: the model's; least squares for SHOT.
+    pub solver: Option<FmapSolver>,
+    /// SHOT radius relative to sqrt(area). Default: the model's; that of [`ShotOptions`] for SHOT.
+    pub shot_radius: Option<f64>,
+    /// Meshes of more vertices are decimated to so many; `Some(None)`: never. Default: the model's; 15000 for SHOT.
+    pub decimate: Option<Option<usize>>,
+    /// Refinement. Default: ZoomOut for learned descriptors, none for SHOT.
+    pub refinement: Option<Refinement>,
+    /// Upscaling of the map of decimated meshes.
+    pub upscaling: Upscaling,
+    /// Folder of results kept for each shape; `None`: nothing is kept.
+    pub cache: Option<PathBuf>,
+}
+
+/// Eigenfunctions that ZoomOut goes up to.
+const ZOOMOUT_K: usize = 200;
+/// Eigenfunctions of the full meshes in upscaling.
+const UPSCALE_K: usize = 100;
+
+/// The model that is built into the library.
+const EMBEDDED_MODEL: &[u8] = include_bytes!("../../models/bodies/model.onnx");
+
+/// A shape with its descriptors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DescribedShape {
+    /// The processed shape.
+    pub shape: Shape,
+    /// Descriptors of its working mesh, `[n, 352]`.
+    pub descriptors: Matrix<f32>,
+    key: CacheKey,
+}
+
+/// The result for a pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Match {
+    /// Target vertex of each source vertex, in the input's vertices.
+    pub map: PointMap,
+    /// The functional map of the working meshes, `[k_target, k_source]`, before refinement.
+    pub functional_map: Matrix,
+    /// How its solution went.
+    pub functional_map_info: FmapInfo,
+    /// How the upscaling went, where there was one.
+    pub upscale_info: Option<AdmmInfo>,
+}
+
+/// Matches shapes; loads the model once.
+#[derive(Debug)]
+pub struct Matcher {
+    shape_options: ShapeOptions,
+    k: usize,
+    solver: FmapSolver,
+    refinement: Refinement,
+    upscaling: Upscaling,
+    network: Option<DescriptorNetwork>,
+    cache: Option<Cache>,
+}
+
+impl Matcher {
+    /// Loads the model and settles every option.
+    pub fn new(options: &MatchOptions) -> Result<Self, Error> {
+        let network = match (options.descriptor, &options.model) {
+            (DescriptorKind::Shot, _) => None,
+            (_, ModelSource::File(path)) => Some(DescriptorNetwork::load(path, options.backend)?),
+            (_, ModelSource::Embedded) => {
+                Some(DescriptorNetwork::from_bytes(Path::new("embedded model"), EMBEDDED_MODEL, options.backend)?)
+            }
+        };
+        let mut shape_options = network.as_ref().map(|n| n.metadata().shape_options()).unwrap_or_default();
+        let model_k = shape_options.k;
+        let k = options.k.unwrap_or(model_k);
+        if let Some(radius) = options.shot_radius {
+            shape_options.shot = ShotOptions { radius, ..shape_options.shot };
+        }
+        shape_options.decimate = options.decimate.unwrap_or(shape_options.decimate);
+        let default_refinement = if network.is_some() { Refinement::Zoomout } else { Refinement::None };
+        let refinement = options.refinement.unwrap_or(default_refinement);
+        shape_options.k = if refinement == Refinement::Zoomout { k.max(ZOOMOUT_K) } else { k };
+        let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver);
+        Ok(Self {
+            shape_options,
+            k,
+            solver: options.solver.unwrap_or(default_solver),
+            refinement,
+            upscaling: options.upscaling,
+            network,
+            cache: options.cache.as_deref().map(Cache::open).transpose()?,
+        })
+    }
+
+    /// The settings that shapes are processed with.
+    pub fn shape_options(&self) -> &ShapeOptions {
+        &self.shape_options
+    }
+
+    /// Number of eigenfunctions of the functional map.
+    pub fn k(&self) -> usize {
+        self.k
+    }
+
+    /// The model, unless descriptors are SHOT.
+    pub fn network(&self) -> Option<&DescriptorNetwork> {
+        self.network.as_ref()
+    }
+
+    /// Processes a shape and computes its descriptors; `name` is for messages.
+    pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
+        let cache = self.cache.as_ref();
+        let options = self.options_for(mesh);
+        let shape = Shape::process_cached(name, mesh, &options, cache, observer)?;
+        let key = Shape::cache_key(mesh, &options);
+        let Some(network) = &self.network else {
+            let descriptors = shape.shot.clone();
+            return Ok(DescribedShape { shape, descriptors, key });
+        };
+        let network_key = CacheKey::of(&[key.as_bytes(), network.fingerprint(), network.backend().to_string().as_bytes()]);
+        if let Some(descriptors) = cache.and_then(|cache| cached_matrix(cache, "descriptors", network_key, observer)) {
+            return Ok(DescribedShape { shape, descriptors, key });
+        }
+        let descriptors = timed(observer, name, "network", || network.descriptors(&shape.shot))?;
+        if let Some(cache) = cache {
+            let mut out = Encoder::default();
+            out.matrix(&descriptors);
+            cache.put("descriptors", network_key, &out.finish())?;
+        }
+        Ok(DescribedShape { shape, descriptors, key })
+    }
+
+    /// Small meshes do not have so many eigenfunctions as refinement would like.
+    fn options_for(&self, mesh: &Mesh) -> ShapeOptions {
+        let available = (mesh.n_vertices() / 4).max(self.k);
+        ShapeOptions { k: self.shape_options.k.min(available), ..self.shape_options.clone() }
+    }
+
+    /// Computes the map of a pair.
+    pub fn match_shapes(
+        &self,
+        source: &DescribedShape,
+        target: &DescribedShape,
+        observer: Observer,
+    ) -> Result<Match, Error> {
+        let pair = format!("{} -> {}", source.shape.name, target.shape.name);
+        let (basis_source, basis_target) = (source.shape.basis.truncated(self.k), target.shape.basis.truncated(self.k));
+        let (functional_map, functional_map_info) = timed(observer, &pair, "functional map", || {
+            let (f, g) = (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
+            functional_map(&basis_source, &basis_target, &f, &g, self.solver)
+        })?;
+        if functional_map_info.rank < self.k {
+            observer(Event::Warning(format!(
+                "{pair}: the descriptors determine only {} of {} dimensions of the functional map",
+                functional_map_info.rank, self.k
+            )));
+        }
+        let raw = timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target));
+        let map = self.refine(&source.shape, &target.shape, &functional_map, raw, &pair, observer)?;
+        let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
+        let map = in_input_vertices(&source.shape, &target.shape, &map);
+        Ok(Match { map, functional_map, functional_map_info, upscale_info })
+    }
+
+    fn refine(
+        &self,
+        source: &Shape,
+        target: &Shape,
+        functional_map: &Matrix,
+        raw: PointMap,
+        pair: &str,
+        observer: Observer,
+    ) -> Result<PointMap, Error> {
+        match self.refinement {
+            Refinement::None => Ok(raw),
+            Refinement::Icp => {
+                let (basis_source, basis_target) = (source.basis.truncated(self.k), target.basis.truncated(self.k));
+                let refined = timed(observer, pair, "icp", || {
+                    icp(functional_map, &basis_source, &basis_target, &IcpOptions::default())
+                })?;
+                Ok(refined.map)
+            }
+            Refinement::Zoomout => {
+                let refined = timed(observer, pair, "zoomout", || {
+                    zoomout(&raw, source.mesh(), target.mesh(), &source.basis, &target.basis, &ZoomOutOptions::default())
+                })?;
+                Ok(refined.map)
+            }
+        }
+    }
+
+    /// From the working meshes to the full ones, where they differ.
+    fn upscale(
+        &self,
+        source: &DescribedShape,
+        target: &DescribedShape,
+        map: PointMap,
+        pair: &str,
+        observer: Observer,
+    ) -> Result<(PointMap, Option<AdmmInfo>), Error> {
+        if source.shape.decimated.is_none() && target.shape.decimated.is_none() {
+            return Ok((map, None));
+        }
+        let full_source = self.full_basis(source, observer)?;
+        let full_target = self.full_basis(target, observer)?;
+        let matches: Vec<(u32, u32)> = (0..map.len())
+            .filter_map(|i| Some((source.shape.full_of_work(i as u32), target.shape.full_of_work(map.get(i)?))))
+            .collect();
+        let (phi, psi) = delta_coefficients(&full_source, &full_target, &matches);
+        let (full_map, info) = timed(observer, pair, "upscale", || match self.upscaling {
+            Upscaling::L21 => {
+                l21_functional_map(&phi, &psi, &AdmmOptions::default()).map(|(c, info)| (c, Some(info)))
+            }
+            Upscaling::LeastSquares => least_squares_functional_map(&phi, &psi).map(|c| (c, None)),
+        })?;
+        let map = timed(observer, pair, "full point map", || recover(&full_map, &full_source, &full_target));
+        Ok((map, info))
+    }
+
+    /// The eigenbasis of the full mesh, `[n_full, UPSCALE_K]`.
+    fn full_basis(&self, described: &DescribedShape, observer: Observer) -> Result<Eigenbasis, Error> {
+        let shape = &described.shape;
+        if shape.decimated.is_none() {
+            return Ok(shape.basis.truncated(UPSCALE_K.min(shape.basis.k())));
+        }
+        let key = CacheKey::of(&[described.key.as_bytes(), &UPSCALE_K.to_le_bytes()]);
+        if let Some(basis) = self.cache.as_ref().and_then(|cache| cached_basis(cache, key, observer)) {
+            return Ok(basis);
+        }
+        let (basis, _) = timed(observer, &shape.name, "full eigenbasis", || {
+            eigenbasis(&Laplacian::new(&shape.full_mesh), UPSCALE_K, &EigenOptions::default())
+        })
+        .map_err(|e| Error::from(e).in_shape(&shape.name))?;
+        if let Some(cache) = &self.cache {
+            let mut out = Encoder::default();
+            out.slice(&basis.eigenvalues).slice(&basis.mass).matrix(&basis.eigenvectors);
+            cache.put("full-basis", key, &out.finish())?;
+        }
+        Ok(basis)
+    }
+}
+
+/// Matches two meshes with the given options: one pair, everything computed anew.
+pub fn match_meshes(source: &Mesh, target: &Mesh, options: &MatchOptions) -> Result<Match, Error> {
+    let matcher = Matcher::new(options)?;
+    let observer: Observer = &crate::events::ignore;
+    let source = matcher.describe("source", source, observer)?;
+    let target = matcher.describe("target", target, observer)?;
+    matcher.match_shapes(&source, &target, observer)
+}
+
+/// Takes a map of the full repaired meshes to the vertices of the input meshes.
+fn in_input_vertices(source: &Shape, target: &Shape, map: &PointMap) -> PointMap {
+    let full: Vec<Option<usize>> =
+        source.full_of_input.iter().map(|&v| (v != Shape::NONE).then_some(v as usize)).collect();
+    let target_of = |v: &Option<usize>| {
+        v.and_then(|v| map.get(v)).map_or(PointMap::UNMATCHED, |t| target.input_of_full[t as usize])
+    };
+    let confidence = map.confidence.as_ref().map(|values| {
+        full.iter().map(|v| v.map_or(0.0, |v| values[v])).collect()
+    });
+    PointMap { targets: full.iter().map(target_of).collect(), confidence, n_target: target.n_input }
+}
+
+fn cached_matrix(cache: &Cache, kind: &str, key: CacheKey, observer: Observer) -> Option<Matrix<f32>> {
+    Decoder::new(&cache.fetch(kind, key, observer)?).matrix()
+}
+
+fn cached_basis(cache: &Cache, key: CacheKey, observer: Observer) -> Option<Eigenbasis> {
+    let bytes = cache.fetch("full-basis", key, observer)?;
+    let mut input = Decoder::new(&bytes);
+    Some(Eigenbasis { eigenvalues: input.slice()?, mass: input.slice()?, eigenvectors: input.matrix()? })
+}

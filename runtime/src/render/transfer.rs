@@ -1,0 +1,197 @@
+//! Attributes carried over a map.
+//!
+//! A map gives each source vertex a target vertex, so the source can take whatever the target has, vertex by vertex. The other
+//! way round each target vertex takes from the source vertex whose match is nearest on the target.
+
+use crate::io::{Attributes, Skin};
+use crate::mesh::{Adjacency, vec3};
+use crate::point_map::PointMap;
+use crate::{Matrix, Mesh};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// For each receiving vertex the giving vertex, if it has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Donors(Vec<Option<u32>>);
+
+impl Donors {
+    /// The source receives: each vertex from its match.
+    pub fn of_source(map: &PointMap) -> Self {
+        Self(map.iter().collect())
+    }
+
+    /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several that match
+    /// the same vertex, from the one of the lowest index.
+    pub fn of_target(map: &PointMap, target: &Mesh) -> Self {
+        let mut donor: Vec<Option<u32>> = vec![None; target.n_vertices()];
+        let mut distance = vec![f64::INFINITY; target.n_vertices()];
+        let mut queue = BinaryHeap::new();
+        for (source, matched) in map.iter().enumerate() {
+            if let Some(vertex) = matched.filter(|&t| donor[t as usize].is_none()) {
+                donor[vertex as usize] = Some(source as u32);
+                distance[vertex as usize] = 0.0;
+                queue.push(Reverse((Ordered(0.0), vertex)));
+            }
+        }
+        let adjacency = Adjacency::new(target);
+        while let Some(Reverse((Ordered(d), v))) = queue.pop() {
+            if d > distance[v as usize] {
+                continue;
+            }
+            for &w in adjacency.neighbors(v) {
+                let edge = vec3::distance(target.vertices()[v as usize], target.vertices()[w as usize]);
+                if d + edge < distance[w as usize] {
+                    distance[w as usize] = d + edge;
+                    donor[w as usize] = donor[v as usize];
+                    queue.push(Reverse((Ordered(d + edge), w)));
+                }
+            }
+        }
+        Self(donor)
+    }
+
+    /// Number of receiving vertices.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there are no receiving vertices.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The giving vertex of each receiving vertex in turn.
+    pub fn iter(&self) -> impl Iterator<Item = Option<u32>> + '_ {
+        self.0.iter().copied()
+    }
+
+    fn gather<T: Copy>(&self, values: &[T], missing: T) -> Vec<T> {
+        self.iter().map(|d| d.map_or(missing, |d| values[d as usize])).collect()
+    }
+}
+
+/// A distance, never NaN, as a key of the queue.
+#[derive(PartialEq, PartialOrd)]
+struct Ordered(f64);
+
+impl Eq for Ordered {}
+
+impl Ord for Ordered {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match.
+pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
+    let rows = donors.iter().map(|d| d.map(|d| d as usize)).collect::<Vec<_>>();
+    Matrix::from_fn(rows.len(), values.cols(), |i, j| rows[i].map_or(f64::NAN, |d| values[(d, j)]))
+}
+
+/// For each landmark of the giver the receiving vertex that takes from nearest to it, if any does.
+pub fn transfer_landmarks(landmarks: &[u32], giver: &Mesh, receiver: &Mesh, donors: &Donors) -> Vec<Option<u32>> {
+    let place = |landmark: u32| {
+        let at = giver.vertices()[landmark as usize];
+        let candidates = (0..receiver.n_vertices() as u32).zip(donors.iter());
+        candidates
+            .filter_map(|(v, donor)| Some((vec3::distance(giver.vertices()[donor? as usize], at), v)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, v)| v)
+    };
+    landmarks.iter().map(|&l| place(l)).collect()
+}
+
+/// Colours, texture coordinates, scalar fields and skin weights of the giver, for the receiver's vertices and corners.
+///
+/// Vertices without a match are grey, at the texture's origin, NaN and without weights. At a seam of the giver's texture a vertex
+/// has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
+pub fn transfer_attributes(giver: &Mesh, attributes: &Attributes, receiver: &Mesh, donors: &Donors) -> Attributes {
+    let skin = attributes.skin.as_ref().map(|skin| Skin {
+        joints: skin.joints.clone(),
+        indices: donors.gather(&skin.indices, [0; 4]),
+        weights: donors.gather(&skin.weights, [0.0; 4]),
+    });
+    let scalars = attributes.vertex_scalars.iter();
+    Attributes {
+        vertex_colors: attributes.vertex_colors.as_ref().map(|c| donors.gather(c, super::UNMATCHED_COLOR)),
+        corner_uvs: attributes.corner_uvs.as_ref().map(|uvs| corner_uvs(giver, uvs, receiver, donors)),
+        texture: attributes.texture.clone(),
+        vertex_scalars: scalars.map(|(name, values)| (name.clone(), donors.gather(values, f32::NAN))).collect(),
+        skin,
+    }
+}
+
+fn corner_uvs(giver: &Mesh, uvs: &[[[f32; 2]; 3]], receiver: &Mesh, donors: &Donors) -> Vec<[[f32; 2]; 3]> {
+    let mut of_vertex: Vec<Vec<[f32; 2]>> = vec![Vec::new(); giver.n_vertices()];
+    for (face, corners) in giver.faces().iter().zip(uvs) {
+        for (&v, &uv) in face.iter().zip(corners) {
+            if !of_vertex[v as usize].contains(&uv) {
+                of_vertex[v as usize].push(uv);
+            }
+        }
+    }
+    let choices = |v: u32| donors.0[v as usize].map_or(&[][..], |d| &of_vertex[d as usize]);
+    receiver.faces().iter().map(|face| closest_together(face.map(choices))).collect()
+}
+
+/// Of each corner's choices the ones that make the smallest triangle in the texture.
+fn closest_together(choices: [&[[f32; 2]]; 3]) -> [[f32; 2]; 3] {
+    const NOWHERE: &[[f32; 2]] = &[[0.0, 0.0]];
+    let [a, b, c] = choices.map(|options| if options.is_empty() { NOWHERE } else { options });
+    let distance = |p: [f32; 2], q: [f32; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
+    let mut best = ([a[0], b[0], c[0]], f32::INFINITY);
+    for &p in a {
+        for &q in b {
+            for &r in c {
+                let size = distance(p, q) + distance(q, r) + distance(r, p);
+                if size < best.1 {
+                    best = ([p, q, r], size);
+                }
+            }
+        }
+    }
+    best.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::{grid, icosphere, permuted};
+
+    #[test]
+    fn a_permutation_carries_everything_to_its_place_and_back() {
+        let giver = icosphere(2);
+        let (receiver, permutation) = permuted(&giver, 3);
+        let donor_of: Vec<u32> = (0..receiver.n_vertices())
+            .map(|v| giver.vertices().iter().position(|p| *p == receiver.vertices()[v]).unwrap() as u32)
+            .collect();
+        assert_eq!(permutation.len(), donor_of.len());
+        let map = PointMap::new(donor_of.clone(), giver.n_vertices());
+        let values = Matrix::from_fn(giver.n_vertices(), 2, |i, j| (2 * i + j) as f64);
+        let moved = transfer_values(&values, &Donors::of_source(&map));
+        assert!((0..moved.rows()).all(|v| moved.row(v) == values.row(donor_of[v] as usize)));
+        let back = transfer_values(&moved, &Donors::of_target(&map, &giver));
+        assert_eq!(back, values);
+        let landmarks = transfer_landmarks(&donor_of[..5], &giver, &receiver, &Donors::of_source(&map));
+        assert_eq!(landmarks, (0..5).map(Some).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn vertices_that_nothing_maps_to_take_from_the_nearest() {
+        let mesh = grid(10, 10);
+        let map = PointMap::new(vec![0, 99, PointMap::UNMATCHED], 100);
+        let donors = Donors::of_target(&map, &mesh);
+        let corner = |v: usize, w: u32| vec3::distance(mesh.vertices()[v], mesh.vertices()[w as usize]);
+        for (v, donor) in donors.iter().enumerate() {
+            let nearer = if corner(v, 0) < corner(v, 99) { 0 } else { 1 };
+            let tie = (corner(v, 0) - corner(v, 99)).abs() < 0.3;
+            assert!(tie || donor == Some(nearer), "vertex {v} takes from {donor:?}");
+        }
+    }
+
+    #[test]
+    fn no_triangle_spans_a_seam() {
+        let uvs = [&[[0.0, 0.5], [1.0, 0.5]][..], &[[0.9, 0.5]][..], &[[0.95, 0.6]][..]];
+        assert_eq!(closest_together(uvs)[0], [1.0, 0.5]);
+    }
+}

@@ -1,0 +1,106 @@
+//! A self-contained HTML page with both shapes of a pair, coloured by the map: turn and zoom with the mouse, hover a point to
+//! see its match. It opens from disk and needs no network.
+
+use super::{map_colors, position_colors};
+use crate::Mesh;
+use crate::point_map::PointMap;
+use serde_json::json;
+
+const TEMPLATE: &str = include_str!("viewer.html");
+
+/// What the viewer shows.
+#[derive(Clone, Debug)]
+pub struct ViewerPair<'a> {
+    /// Title of the page.
+    pub title: &'a str,
+    /// Name under the source.
+    pub name_source: &'a str,
+    /// Name under the target.
+    pub name_target: &'a str,
+    /// The source.
+    pub source: &'a Mesh,
+    /// The target.
+    pub target: &'a Mesh,
+    /// Source to target.
+    pub map: &'a PointMap,
+    /// A line under the title, such as the error.
+    pub caption: &'a str,
+}
+
+/// The whole page.
+pub fn viewer_html(pair: &ViewerPair) -> String {
+    let colors_target = position_colors(pair.target);
+    let colors_source = map_colors(pair.map, &colors_target);
+    let targets: Vec<i32> = (0..pair.map.len()).map(|i| pair.map.get(i).map_or(-1, |t| t as i32)).collect();
+    let data = json!({
+        "title": pair.title,
+        "caption": pair.caption,
+        "source": shape(pair.name_source, pair.source, &colors_source),
+        "target": shape(pair.name_target, pair.target, &colors_target),
+        "map": base64(bytemuck::cast_slice(&targets)),
+    });
+    // "</" would end the script element early.
+    let data = data.to_string().replace("</", "<\\/");
+    TEMPLATE.replace("__TITLE__", &escaped(pair.title)).replace("__DATA__", &data)
+}
+
+fn shape(name: &str, mesh: &Mesh, colors: &[[u8; 4]]) -> serde_json::Value {
+    let positions: Vec<f32> = mesh.vertices().iter().flatten().map(|&x| x as f32).collect();
+    json!({
+        "name": name,
+        "positions": base64(bytemuck::cast_slice(&positions)),
+        "faces": base64(bytemuck::cast_slice(mesh.faces())),
+        "colors": base64(bytemuck::cast_slice(colors)),
+    })
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
+}
+
+/// Standard base64 with padding (RFC 4648, section 4).
+fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let word = chunk.iter().enumerate().fold(0u32, |word, (i, &byte)| word | u32::from(byte) << (16 - 8 * i));
+        for i in 0..4 {
+            let used = i <= chunk.len();
+            text.push(if used { ALPHABET[(word >> (18 - 6 * i) & 63) as usize] as char } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::icosphere;
+
+    #[test]
+    fn base64_of_the_rfc() {
+        for (plain, encoded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(plain.as_bytes()), encoded);
+        }
+    }
+
+    #[test]
+    fn the_page_is_complete_and_names_cannot_break_it() {
+        let mesh = icosphere(1);
+        let n = mesh.n_vertices();
+        let map = PointMap { targets: (0..n as u32).collect(), confidence: None, n_target: n };
+        let page = viewer_html(&ViewerPair {
+            title: "a <b> & c",
+            name_source: "</script>",
+            name_target: "target",
+            source: &mesh,
+            target: &mesh,
+            map: &map,
+            caption: "",
+        });
+        assert!(!page.contains("__DATA__") && !page.contains("__TITLE__"));
+        assert!(page.contains("<title>a &lt;b> &amp; c</title>"));
+        assert_eq!(page.matches("</script>").count(), 1);
+        assert!(!page.contains("http://") && !page.contains("https://"));
+    }
+}

@@ -1,0 +1,144 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand};
+use fmnet_trainer::config::{TrainConfig, TrainOverrides};
+use std::path::PathBuf;
+
+/// Trains the descriptor network of fmnet through the functional map, and exports it to ONNX.
+///
+/// From nothing to a model:
+///
+///   fmnet-train synth data/bodies
+///   fmnet-train train --dataset data/bodies --out runs/bodies
+///   fmnet-train export runs/bodies -o bodies.onnx
+#[derive(Debug, Parser)]
+#[command(name = "fmnet-train", version, max_term_width = 110, verbatim_doc_comment)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Common {
+    /// Threads to use; the result does not depend on it [default: all cores]
+    #[arg(long, global = true, value_parser = positive)]
+    pub(crate) threads: Option<usize>,
+    /// Say nothing but warnings and errors
+    #[arg(long, global = true)]
+    pub(crate) quiet: bool,
+    /// Print a summary for scripts on standard output
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Generate a dataset of deforming bodies with exact ground truth
+    Synth(SynthArgs),
+    /// Compute eigenbases, SHOT and geodesic distances of a dataset once; an interrupted run goes on where it was
+    Preprocess(PreprocessArgs),
+    /// Train a network, or go on training it: the same command again resumes from the last checkpoint
+    Train(Box<TrainArgs>),
+    /// Write a checkpoint's network as a model file
+    Export(ExportArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SynthArgs {
+    /// Folder for the dataset
+    pub(crate) folder: PathBuf,
+    /// Individuals of each species, 2 and up
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) count: u32,
+    /// Seed: the same seed gives the same dataset
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Least number of vertices of a body, 1000 to 20000
+    #[arg(long, default_value_t = 5000)]
+    pub(crate) min_vertices: usize,
+    /// Largest number of vertices of a body, 1000 to 20000
+    #[arg(long, default_value_t = 7000)]
+    pub(crate) max_vertices: usize,
+    /// Holes in each body, 0 and up
+    #[arg(long, default_value_t = 0)]
+    pub(crate) holes: usize,
+    /// Limbs cut off each body, 0 and up
+    #[arg(long, default_value_t = 0)]
+    pub(crate) cuts: usize,
+    /// Noise on the vertices, relative to the mean edge length, 0 to 0.5
+    #[arg(long, default_value_t = 0.0)]
+    pub(crate) noise: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PreprocessArgs {
+    /// Dataset folders: FAUST registrations (tr_reg_NNN.ply), FAUST remeshed (tr_reg_NNN.off with corres/*.vts), FAUST
+    /// scans (scans/ and registrations/), SCAPE (meshNNN.off), TOSCA (CLASSn.off), SHREC'16 partial (null/ with holes/ or
+    /// cuts/), or any folder with a dataset.toml
+    #[arg(required = true)]
+    pub(crate) datasets: Vec<String>,
+    /// Folder for the results; pass the same to `train`
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: PathBuf,
+    /// Training configuration that the results are for
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainArgs {
+    /// Settings from a file; options on the command line win over it
+    #[arg(long, value_name = "FILE.toml")]
+    pub(crate) config: Option<PathBuf>,
+    /// Train on the first NVIDIA GPU (needs the feature `cuda`)
+    #[arg(long)]
+    pub(crate) cuda: bool,
+    #[command(flatten)]
+    pub(crate) overrides: TrainOverrides,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// A run's folder (its best checkpoint, or the last where nothing was validated), or a checkpoint
+    pub(crate) checkpoint: PathBuf,
+    /// The model file
+    #[arg(short, long, value_name = "MODEL.onnx")]
+    pub(crate) output: PathBuf,
+    /// What the model was trained on, for its metadata [default: the names of the dataset folders]
+    #[arg(long)]
+    pub(crate) training_set: Option<String>,
+    /// Licence of the weights, for the metadata
+    #[arg(long, default_value = "unspecified")]
+    pub(crate) license: String,
+    /// Source revision, for the metadata
+    #[arg(long, default_value = env!("CARGO_PKG_VERSION"))]
+    pub(crate) commit: String,
+}
+
+fn positive(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected 1 or more".into())
+}
+
+/// Adds the defaults of the training settings to their help, from the one place that knows them.
+pub(crate) fn with_defaults(command: clap::Command) -> clap::Command {
+    let defaults = toml::Table::try_from(TrainConfig::default()).expect("plain data serialises");
+    command.mut_subcommand("train", |train| {
+        train.mut_args(|arg| {
+            let Some(default) = defaults.get(&arg.get_id().as_str().replace('_', "-")) else { return arg };
+            let help = arg.get_help().cloned().unwrap_or_default();
+            let text = match default {
+                toml::Value::String(text) if text.is_empty() => return arg,
+                toml::Value::String(text) => text.clone(),
+                toml::Value::Array(items) if items.is_empty() => return arg,
+                toml::Value::Array(items) => {
+                    items.iter().filter_map(toml::Value::as_str).collect::<Vec<_>>().join(",")
+                }
+                other => other.to_string(),
+            };
+            arg.help(format!("{help} [default: {text}]"))
+        })
+    })
+}

@@ -1,0 +1,44 @@
+//! `fmnet-train train`.
+
+use crate::args::{Common, TrainArgs};
+use crate::progress::Progress;
+use anyhow::{Context, Result};
+use candle_core::Device;
+use fmnet_trainer::config::TrainConfig;
+use fmnet_trainer::train::train;
+use serde_json::json;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
+    let mut config = match &args.config {
+        Some(path) => TrainConfig::read(path)?,
+        None => TrainConfig::default(),
+    };
+    args.overrides.apply(&mut config);
+    let device = match args.cuda {
+        true => Device::new_cuda(0).context("no CUDA device; build with `--features cuda`, or leave --cuda out")?,
+        false => Device::Cpu,
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    // The first interrupt ends the run after the current minibatch, with a checkpoint; a second one at once.
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?;
+    let progress = Progress::new(common);
+    let summary = train(&config, &device, &|event| progress.event(event), &stop)?;
+    let out = config.out.display();
+    if summary.stopped {
+        progress.say(&format!("stopped after minibatch {}; the same command goes on from there", summary.step));
+    } else {
+        progress.say(&format!("done; write the model with: fmnet-train export {out} -o model.onnx"));
+    }
+    if common.json {
+        let best = summary.best_error.is_finite().then_some(summary.best_error);
+        println!("{:#}", json!({ "out": config.out, "step": summary.step, "stopped": summary.stopped, "best_error": best }));
+    }
+    Ok(())
+}

@@ -1,0 +1,176 @@
+//! Checkpoints: everything that a run needs to go on exactly where it was.
+//!
+//! A safetensors file with the flat parameters, Adam's two moments and the running statistics; its metadata holds the
+//! configuration, the number of minibatches done and the best validation. Minibatches are a function of seed and number, so no
+//! generator needs saving. Written to a temporary name and renamed.
+
+use crate::config::TrainConfig;
+use crate::network::{BatchMoments, Network};
+use crate::optimizer::AdamState;
+use crate::step::StepRunner;
+use candle_core::Device;
+use fmnet::io::{IoError, write_atomically};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+const FORMAT: &str = "1";
+
+/// A saved state of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpoint {
+    /// The run's configuration.
+    pub config: TrainConfig,
+    /// Minibatches done.
+    pub step: u64,
+    /// Best validated mean error so far; infinite before the first validation.
+    pub best_error: f64,
+    /// Flat parameters.
+    pub parameters: Vec<f32>,
+    /// The optimiser's state.
+    pub adam: AdamState,
+    /// Running statistics of the normalisations.
+    pub running: Vec<[BatchMoments; 2]>,
+}
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, Error)]
+pub enum CheckpointError {
+    /// The file cannot be written.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is not a checkpoint of this version.
+    #[error("{path}: {reason}; it is no checkpoint of this version")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Candle failed.
+    #[error(transparent)]
+    Tensor(#[from] candle_core::Error),
+}
+
+impl Checkpoint {
+    /// The state of a runner after `step` minibatches.
+    pub fn of(runner: &StepRunner, config: &TrainConfig, step: u64, best_error: f64) -> Result<Self, CheckpointError> {
+        Ok(Self {
+            config: config.clone(),
+            step,
+            best_error,
+            parameters: runner.network.parameter_values()?,
+            adam: runner.adam.state()?,
+            running: runner.network.running_statistics().to_vec(),
+        })
+    }
+
+    /// A runner in this state.
+    pub fn into_runner(self, device: &Device) -> Result<StepRunner, CheckpointError> {
+        let network = self.network(device)?;
+        let mut runner = StepRunner::new(network, self.config.step_options())
+            .map_err(|e| candle_core::Error::msg(e.to_string()))?;
+        runner.adam.restore(self.adam)?;
+        Ok(runner)
+    }
+
+    /// The network in this state.
+    pub fn network(&self, device: &Device) -> Result<Network, CheckpointError> {
+        let mut network = Network::new(self.config.network_options(), device)?;
+        network.set_parameter_values(&self.parameters)?;
+        network.set_running_statistics(self.running.clone())?;
+        Ok(network)
+    }
+
+    /// Writes the file.
+    pub fn write(&self, path: &Path) -> Result<(), CheckpointError> {
+        let running: Vec<f64> =
+            self.running.iter().flatten().flat_map(|m| m.mean.iter().chain(&m.variance).copied()).collect();
+        let metadata = HashMap::from([
+            ("format".to_string(), FORMAT.to_string()),
+            ("config".to_string(), self.config.to_toml()),
+            ("step".to_string(), self.step.to_string()),
+            ("adam_step".to_string(), self.adam.step.to_string()),
+            ("best_error".to_string(), self.best_error.to_string()),
+        ]);
+        let content = |reason: safetensors::SafeTensorError| self.error(path, reason.to_string());
+        let f32_view = |values| TensorView::new(Dtype::F32, vec![values_len(values)], bytemuck::cast_slice(values));
+        let tensors = [
+            ("adam.first", f32_view(&self.adam.first).map_err(content)?),
+            ("adam.second", f32_view(&self.adam.second).map_err(content)?),
+            ("parameters", f32_view(&self.parameters).map_err(content)?),
+            (
+                "running",
+                TensorView::new(Dtype::F64, vec![running.len()], bytemuck::cast_slice(&running)).map_err(content)?,
+            ),
+        ];
+        let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(content)?;
+        Ok(write_atomically(path, |out| out.write_all(&bytes))?)
+    }
+
+    /// Reads the file.
+    pub fn read(path: &Path) -> Result<Self, CheckpointError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.to_path_buf(), source })?;
+        Self::decode(&bytes).map_err(|reason| CheckpointError::Content { path: path.to_path_buf(), reason })
+    }
+
+    fn decode(bytes: &[u8]) -> Result<Self, String> {
+        let text = |e: safetensors::SafeTensorError| e.to_string();
+        let (_, header) = SafeTensors::read_metadata(bytes).map_err(text)?;
+        let metadata = header.metadata().clone().unwrap_or_default();
+        let value = |key: &str| metadata.get(key).cloned().ok_or_else(|| format!("no {key} in its metadata"));
+        if value("format")? != FORMAT {
+            return Err(format!("format {}", value("format")?));
+        }
+        let config: TrainConfig = toml::from_str(&value("config")?).map_err(|e| e.to_string())?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(text)?;
+        let array = |name: &str| -> Result<Vec<f32>, String> {
+            Ok(bytemuck::pod_collect_to_vec(tensors.tensor(name).map_err(text)?.data()))
+        };
+        let running: Vec<f64> = bytemuck::pod_collect_to_vec(tensors.tensor("running").map_err(text)?.data());
+        Ok(Self {
+            running: moments(&running, config.blocks)?,
+            config,
+            step: number(&value("step")?)?,
+            best_error: number(&value("best_error")?)?,
+            parameters: array("parameters")?,
+            adam: AdamState {
+                step: number(&value("adam_step")?)?,
+                first: array("adam.first")?,
+                second: array("adam.second")?,
+            },
+        })
+    }
+
+    fn error(&self, path: &Path, reason: String) -> CheckpointError {
+        CheckpointError::Content { path: path.to_path_buf(), reason }
+    }
+}
+
+fn values_len(values: &[f32]) -> usize {
+    values.len()
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| format!("{text:?} is no number"))
+}
+
+fn moments(values: &[f64], blocks: usize) -> Result<Vec<[BatchMoments; 2]>, String> {
+    let width = values.len() / (4 * blocks.max(1));
+    if width == 0 || values.len() != width * 4 * blocks {
+        return Err(format!("{} running statistics for {blocks} blocks", values.len()));
+    }
+    let one = |part: &[f64]| BatchMoments { mean: part[..width].to_vec(), variance: part[width..].to_vec() };
+    let block = |part: &[f64]| [one(&part[..2 * width]), one(&part[2 * width..])];
+    Ok(values.chunks(4 * width).map(block).collect())
+}

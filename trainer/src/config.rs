@@ -1,0 +1,320 @@
+//! The settings of a training run: one type for the configuration file, the command line, the saved copy and the defaults.
+
+use crate::dataset::Split;
+use crate::fm_layer::FmSolver;
+use crate::loss::LossOptions;
+use crate::network::{Activation, NetworkOptions, Normalization};
+use crate::soft_map::ColumnNorm;
+use crate::step::StepOptions;
+use fmnet::descriptor::ShotOptions;
+use fmnet::fmap::FmapSolver;
+use fmnet::shape::ShapeOptions;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// How points of a minibatch are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Every vertex with the same probability.
+    Uniform,
+    /// With probability proportional to the vertex's area, so that dense regions do not dominate (the paper, for scans).
+    Area,
+}
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossKind {
+    /// The soft error of the soft correspondence (the paper's equation "soft_corr").
+    Soft,
+    /// The contrastive loss without the functional map (the paper's equation "siam").
+    Siamese,
+}
+
+/// The solver of the functional map inside the training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverKind {
+    /// The paper's plain least squares.
+    LeastSquares,
+    /// With the resolvent mask of Ren et al. 2019.
+    Regularized,
+}
+
+/// A list of values, separated by commas on the command line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct List<T>(pub Vec<T>);
+
+impl<T: FromStr> FromStr for List<T> {
+    type Err = T::Err;
+
+    fn from_str(text: &str) -> Result<Self, T::Err> {
+        text.split(',').filter(|s| !s.is_empty()).map(T::from_str).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl<T: fmt::Display> fmt::Display for List<T> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let items: Vec<String> = self.0.iter().map(T::to_string).collect();
+        f.write_str(&items.join(","))
+    }
+}
+
+impl FromStr for Split {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        <Self as clap::ValueEnum>::from_str(text, true)
+    }
+}
+
+macro_rules! train_config {
+    ($( $(#[doc = $doc:literal])+ $name:ident : $kind:ty = $default:expr ),* $(,)?) => {
+        /// Settings of a training run, as in `--config FILE.toml`, on the command line and in the run's folder.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+        pub struct TrainConfig {
+            $( $(#[doc = $doc])+ pub $name: $kind, )*
+        }
+
+        impl Default for TrainConfig {
+            fn default() -> Self {
+                Self { $( $name: $default, )* }
+            }
+        }
+
+        /// The same settings on the command line, where each is optional and wins over the file.
+        #[derive(Clone, Debug, Default, clap::Args)]
+        pub struct TrainOverrides {
+            $( $(#[doc = $doc])+ #[arg(long)] pub $name: Option<$kind>, )*
+        }
+
+        impl TrainOverrides {
+            /// Replaces the settings that were given on the command line.
+            pub fn apply(self, config: &mut TrainConfig) {
+                $( if let Some(value) = self.$name { config.$name = value; } )*
+            }
+        }
+    };
+}
+
+train_config! {
+    /// Dataset folders, separated by commas (see `fmnet-train preprocess --help` for the layouts)
+    dataset: List<String> = List(Vec::new()),
+    /// Folder of the run: checkpoints, metrics, plot
+    out: PathBuf = PathBuf::from("runs/default"),
+    /// Folder where preprocessed shapes are kept; empty: OUT/cache
+    cache: PathBuf = PathBuf::new(),
+    /// Splits to train on: train, validation, test, separated by commas
+    splits: List<Split> = List(vec![Split::Train]),
+    /// Minibatches to train for
+    steps: u64 = 3000,
+    /// Pairs in a minibatch; their gradients are averaged
+    pairs: usize = 1,
+    /// Points in a minibatch, at most; the paper uses about 1500
+    points: usize = 1000,
+    /// Points of each group between which geodesic distances are computed beforehand
+    pool: usize = 2500,
+    /// Eigenfunctions of each shape, 1 to 352
+    k: usize = 120,
+    /// Meshes of more vertices are decimated to so many; 0: never
+    decimate: usize = 15_000,
+    /// SHOT radius, relative to sqrt(area)
+    shot_radius: f64 = ShotOptions::default().radius,
+    /// Solver of the functional map inside the training
+    solver: SolverKind = SolverKind::Regularized,
+    /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T
+    mask_weight: f64 = 0.1,
+    /// What is minimised
+    loss: LossKind = LossKind::Soft,
+    /// The norm that columns of the soft correspondence are divided by
+    column_norm: ColumnNorm = ColumnNorm::L2,
+    /// Siamese loss: margin of dissimilar points
+    margin: f64 = 1.0,
+    /// Siamese loss: trade-off between similar and dissimilar points, between 0 and 1
+    gamma: f64 = 0.5,
+    /// Residual blocks
+    blocks: usize = 7,
+    /// Normalisation inside the residual blocks
+    normalization: Normalization = Normalization::PerShape,
+    /// Activation inside the residual blocks
+    activation: Activation = Activation::Elu,
+    /// How points are drawn
+    sampling: Sampling = Sampling::Uniform,
+    /// Each point is replaced by one of so many nearest vertices; 1: none; the paper uses 10 for scans
+    jitter: usize = 1,
+    /// Learning rate of Adam at the beginning
+    learning_rate: f64 = 1e-3,
+    /// Learning rate at the end; it falls along a half cosine
+    final_learning_rate: f64 = 1e-5,
+    /// Gradients of a larger norm are scaled down to it; 0: never
+    clip: f64 = 0.0,
+    /// Seed of the initialisation, the pools and the minibatches
+    seed: u64 = 1,
+    /// Minibatches between checkpoints
+    checkpoint_every: u64 = 100,
+    /// Minibatches between validations; 0: never
+    validate_every: u64 = 500,
+    /// Pairs of the validation split to validate on
+    validation_pairs: usize = 10,
+}
+
+/// Why a configuration cannot be used.
+#[derive(Debug, Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is no configuration.
+    #[error("{path}: {reason}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and on which line.
+        reason: String,
+    },
+    /// A value is out of its range.
+    #[error("{name} is {value}, but must be {expected}")]
+    Range {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// The range.
+        expected: &'static str,
+    },
+}
+
+impl TrainConfig {
+    /// Reads a TOML file; settings it leaves out have their defaults.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_path_buf(), source })?;
+        toml::from_str(&text)
+            .map_err(|e| ConfigError::Parse { path: path.to_path_buf(), reason: e.to_string() })
+    }
+
+    /// The whole configuration as TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("plain data serialises")
+    }
+
+    /// Checks every value's range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let range = |name, ok: bool, value: &dyn fmt::Display, expected| match ok {
+            true => Ok(()),
+            false => Err(ConfigError::Range { name, value: value.to_string(), expected }),
+        };
+        range("dataset", !self.dataset.0.is_empty(), &"empty", "one folder at least")?;
+        range("steps", self.steps > 0, &self.steps, "1 or more")?;
+        range("pairs", self.pairs > 0, &self.pairs, "1 or more")?;
+        range("pool", self.pool >= 100, &self.pool, "100 or more")?;
+        range("k", (1..=352).contains(&self.k), &self.k, "from 1 to 352, the width of the descriptors")?;
+        range("points", self.points >= self.k, &self.points, "k or more, else the points cannot tell k functions apart")?;
+        range("decimate", self.decimate == 0 || self.decimate >= 500, &self.decimate, "0 (never) or 500 or more")?;
+        range("shot-radius", self.shot_radius > 0.0 && self.shot_radius < 1.0, &self.shot_radius, "between 0 and 1")?;
+        range("mask-weight", self.mask_weight >= 0.0, &self.mask_weight, "0 or more")?;
+        range("gamma", (0.0..=1.0).contains(&self.gamma), &self.gamma, "from 0 to 1")?;
+        range("margin", self.margin > 0.0, &self.margin, "more than 0")?;
+        range("blocks", (1..=64).contains(&self.blocks), &self.blocks, "from 1 to 64")?;
+        range("jitter", (1..=100).contains(&self.jitter), &self.jitter, "from 1 (none) to 100")?;
+        range("learning-rate", self.learning_rate > 0.0, &self.learning_rate, "more than 0")?;
+        range("final-learning-rate", self.final_learning_rate >= 0.0, &self.final_learning_rate, "0 or more")?;
+        range("checkpoint-every", self.checkpoint_every > 0, &self.checkpoint_every, "1 or more")
+    }
+
+    /// How shapes are processed.
+    pub fn shape_options(&self) -> ShapeOptions {
+        ShapeOptions {
+            decimate: Some(self.decimate).filter(|&n| n > 0),
+            k: self.k,
+            shot: ShotOptions { radius: self.shot_radius, ..ShotOptions::default() },
+        }
+    }
+
+    /// What the network looks like.
+    pub fn network_options(&self) -> NetworkOptions {
+        NetworkOptions {
+            blocks: self.blocks,
+            activation: self.activation,
+            normalization: self.normalization,
+            seed: self.seed,
+            ..NetworkOptions::default()
+        }
+    }
+
+    /// What a step minimises and how.
+    pub fn step_options(&self) -> StepOptions {
+        let functional_map = match self.solver {
+            SolverKind::LeastSquares => FmSolver::least_squares(),
+            SolverKind::Regularized => FmSolver::Regularized { weight: self.mask_weight },
+        };
+        let loss = match self.loss {
+            LossKind::Soft => LossOptions::SoftError { norm: self.column_norm },
+            LossKind::Siamese => LossOptions::Siamese { gamma: self.gamma, margin: self.margin },
+        };
+        let clip = Some(self.clip).filter(|&clip| clip > 0.0);
+        StepOptions { functional_map, loss, clip, ..StepOptions::default() }
+    }
+
+    /// The solver that the runtime uses with the trained descriptors.
+    pub fn runtime_solver(&self) -> FmapSolver {
+        match self.solver {
+            SolverKind::LeastSquares => FmapSolver::LeastSquares,
+            SolverKind::Regularized => FmapSolver::Regularized { weight: self.mask_weight },
+        }
+    }
+
+    /// Folder of preprocessed shapes.
+    pub fn cache_folder(&self) -> PathBuf {
+        if self.cache.as_os_str().is_empty() { self.out.join("cache") } else { self.cache.clone() }
+    }
+
+    /// Learning rate of minibatch `step`: from `learning_rate` to `final_learning_rate` along a half cosine.
+    pub fn learning_rate_at(&self, step: u64) -> f64 {
+        let progress = (step as f64 / self.steps as f64).min(1.0);
+        let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());
+        self.final_learning_rate + (self.learning_rate - self.final_learning_rate) * cosine
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_saved_configuration_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        let config = TrainConfig { k: 70, jitter: 10, dataset: List(vec!["a".into(), "b".into()]), ..Default::default() };
+        std::fs::write(&path, config.to_toml()).unwrap();
+        assert_eq!(TrainConfig::read(&path).unwrap(), config);
+    }
+
+    #[test]
+    fn a_misspelt_setting_and_a_value_out_of_range_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        std::fs::write(&path, "learning-rat = 0.1").unwrap();
+        assert!(TrainConfig::read(&path).unwrap_err().to_string().contains("learning-rat"));
+        let config = TrainConfig { k: 400, dataset: List(vec!["a".into()]), ..Default::default() };
+        assert!(config.check().unwrap_err().to_string().starts_with("k is 400"));
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_file() {
+        let mut config = TrainConfig { k: 70, ..Default::default() };
+        TrainOverrides { k: Some(50), ..Default::default() }.apply(&mut config);
+        assert_eq!((config.k, config.points), (50, 1000));
+    }
+}

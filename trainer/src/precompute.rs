@@ -1,0 +1,172 @@
+//! What training needs of each shape, computed once: basis, SHOT, the points of its group and the geodesic distances between
+//! a pool of them.
+//!
+//! A full matrix of distances would take 900 MB at 15K vertices. The loss only compares points of a minibatch, so each group of
+//! shapes gets a random pool of points, from which its minibatches are drawn. Distances are kept as 16-bit numbers, in steps
+//! of 1/16384 of sqrt(area): 12 MB a shape for a pool of 2500.
+
+use crate::dataset::{DatasetError, MISSING, ShapeEntry};
+use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
+use fmnet::events::{Observer, timed};
+use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
+use fmnet::mesh::nearest_vertices;
+use fmnet::shape::{Shape, ShapeOptions};
+use fmnet::{Error, Matrix};
+use rand::SeedableRng;
+use rand::seq::index;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Settings of [`prepare`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrepareOptions {
+    /// Decimation, basis and descriptor.
+    pub shape: ShapeOptions,
+    /// Points in the pool of a group. Range 100 and up.
+    pub pool: usize,
+    /// Seed of the pools.
+    pub seed: u64,
+}
+
+/// A shape ready for training or validation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PreparedShape {
+    /// Where it comes from.
+    pub entry: ShapeEntry,
+    /// Basis and descriptors.
+    pub shape: Shape,
+    /// Vertex of the working mesh of every point of the group, [`MISSING`] where the shape lacks it.
+    pub points: Vec<u32>,
+    /// Distances between the points of its pool.
+    pub pool: Pool,
+}
+
+/// The points of its group's pool that a shape has, and the geodesic distances between them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Pool {
+    /// The points, ascending, `[m]`.
+    pub points: Vec<u32>,
+    /// Row by row, `[m, m]`; empty for a part of a shape, whose distances go around its holes.
+    distances: Vec<u16>,
+}
+
+/// Why a shape could not be prepared.
+#[derive(Debug, Error)]
+pub enum PrepareError {
+    /// The dataset's files are wrong.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The mesh could not be processed.
+    #[error(transparent)]
+    Shape(#[from] Error),
+}
+
+/// Reads and processes one shape; results are looked up in the cache and left there.
+pub fn prepare(
+    entry: &ShapeEntry,
+    options: &PrepareOptions,
+    cache: Option<&Cache>,
+    observer: Observer,
+) -> Result<PreparedShape, PrepareError> {
+    let mesh = entry.read()?;
+    let shape = Shape::process_cached(&entry.name, &mesh, &options.shape, cache, observer)?;
+    let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
+    let key = CacheKey::of(&[
+        Shape::cache_key(&mesh, &options.shape).as_bytes(),
+        bytemuck::cast_slice(&points),
+        &options.pool.to_le_bytes(),
+        &options.seed.to_le_bytes(),
+        entry.group.as_bytes(),
+        &[u8::from(entry.partial)],
+    ]);
+    if let Some(pool) = cache.and_then(|cache| cache.fetch("pool", key, observer)).and_then(|b| Pool::decode(&b)) {
+        return Ok(PreparedShape { entry: entry.clone(), shape, points, pool });
+    }
+    let pool = timed(observer, &entry.name, "geodesics", || {
+        Pool::compute(entry, &shape, &points, options)
+    });
+    if let Some(cache) = cache {
+        cache.put("pool", key, &pool.encode()).map_err(Error::from)?;
+    }
+    Ok(PreparedShape { entry: entry.clone(), shape, points, pool })
+}
+
+/// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the nearest.
+fn work_points(shape: &Shape, mesh: &fmnet::Mesh, input_points: &[u32]) -> Vec<u32> {
+    let work_of_input = shape.work_of_input();
+    let lost: Vec<u32> = input_points
+        .iter()
+        .copied()
+        .filter(|&v| v != MISSING && work_of_input[v as usize] == Shape::NONE)
+        .filter(|&v| shape.full_of_input[v as usize] != Shape::NONE)
+        .collect();
+    let positions: Vec<[f64; 3]> = lost.iter().map(|&v| mesh.vertices()[v as usize]).collect();
+    let nearest: BTreeMap<u32, u32> =
+        lost.iter().copied().zip(nearest_vertices(shape.mesh().vertices(), &positions)).collect();
+    let work = |v: u32| nearest.get(&v).copied().unwrap_or_else(|| work_of_input[v as usize]);
+    input_points.iter().map(|&v| if v == MISSING { MISSING } else { work(v) }).collect()
+}
+
+/// Which of the group's points are in its pool: a random choice that all shapes of the group share, ascending.
+fn group_pool(group: &str, n_points: usize, options: &PrepareOptions) -> Vec<u32> {
+    let seed = CacheKey::of(&[&options.seed.to_le_bytes(), group.as_bytes()]);
+    let mut rng = rand_chacha::ChaCha8Rng::from_seed(*seed.as_bytes());
+    let chosen = index::sample(&mut rng, n_points, options.pool.min(n_points));
+    let mut chosen: Vec<u32> = chosen.iter().map(|i| i as u32).collect();
+    chosen.sort_unstable();
+    chosen
+}
+
+impl Pool {
+    /// Steps of the stored distances for one unit, sqrt(area).
+    const STEPS: f32 = 16_384.0;
+
+    fn compute(entry: &ShapeEntry, shape: &Shape, points: &[u32], options: &PrepareOptions) -> Self {
+        let has = |&point: &u32| points[point as usize] != MISSING;
+        let chosen: Vec<u32> =
+            group_pool(&entry.group, points.len(), options).into_iter().filter(has).collect();
+        if entry.partial {
+            return Self { points: chosen, distances: Vec::new() };
+        }
+        let vertices: Vec<u32> = chosen.iter().map(|&p| points[p as usize]).collect();
+        let solver = GeodesicSolver::new(shape.mesh(), &GeodesicOptions::default());
+        let unit = shape.mesh().scale() as f32;
+        let distances = solver.distances_between(&vertices);
+        let quantised = distances.data().iter().map(|d| (d / unit * Self::STEPS).min(65_535.0).round() as u16);
+        Self { points: chosen, distances: quantised.collect() }
+    }
+
+    /// Number of points `m`.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there are no points.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Distances between some points of the pool, ascending, `[q, q]`, in units of sqrt(area); none for a part of a shape.
+    pub fn distances(&self, points: &[u32]) -> Option<Matrix<f32>> {
+        if self.distances.is_empty() {
+            return None;
+        }
+        let position = |point: &u32| self.points.binary_search(point).expect("the point is in the pool");
+        let positions: Vec<usize> = points.iter().map(position).collect();
+        let at = |i: usize, j: usize| self.distances[positions[i] * self.len() + positions[j]];
+        Some(Matrix::from_fn(points.len(), points.len(), |i, j| f32::from(at(i, j)) / Self::STEPS))
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut out = Encoder::default();
+        out.slice(&self.points).slice(&self.distances);
+        out.finish()
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let mut input = Decoder::new(bytes);
+        let pool = Self { points: input.slice()?, distances: input.slice()? };
+        let complete = pool.distances.is_empty() || pool.distances.len() == pool.len() * pool.len();
+        complete.then_some(pool)
+    }
+}

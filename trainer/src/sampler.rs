@@ -1,0 +1,146 @@
+//! Minibatches: which pair, which points.
+//!
+//! A minibatch is one index set of points of a pair, the same for both shapes, so that row `i` of the source corresponds with
+//! row `i` of the target. Minibatch `b` of a run depends on the seed and on `b` alone, so a resumed run draws what the
+//! uninterrupted one would have.
+
+use crate::config::{LossKind, Sampling, TrainConfig};
+use crate::dataset::MISSING;
+use crate::precompute::PreparedShape;
+use crate::step::{PairBatch, ShapeBatch};
+use fmnet::Matrix;
+use fmnet::mesh::nearest_k_vertices;
+use rand::{Rng, SeedableRng, seq::IndexedRandom};
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+/// Draws minibatches from prepared shapes.
+pub struct Sampler<'a> {
+    shapes: &'a [PreparedShape],
+    /// Source and target of every pair that corresponds, both directions.
+    pairs: Vec<(usize, usize)>,
+    /// For each shape, the vertices among which each point is jittered, `[points, jitter]`.
+    jitter: Vec<Vec<u32>>,
+    config: &'a TrainConfig,
+}
+
+/// Why no minibatch can be drawn.
+#[derive(Debug, Error)]
+pub enum SamplerError {
+    /// No two shapes correspond.
+    #[error("none of the {shapes} training shapes share a group and enough points; a group needs two shapes")]
+    NoPairs {
+        /// Number of training shapes.
+        shapes: usize,
+    },
+}
+
+/// Fewer common points than this do not make a pair.
+const MIN_COMMON_POINTS: usize = 50;
+
+impl<'a> Sampler<'a> {
+    /// Lists the pairs and prepares the jitter.
+    pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
+        let mut pairs = Vec::new();
+        for (source, s) in shapes.iter().enumerate() {
+            for (target, t) in shapes.iter().enumerate() {
+                let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.partial;
+                if corresponds && common_points(s, t).len() >= MIN_COMMON_POINTS {
+                    pairs.push((source, target));
+                }
+            }
+        }
+        if pairs.is_empty() {
+            return Err(SamplerError::NoPairs { shapes: shapes.len() });
+        }
+        let jitter = shapes.iter().map(|shape| jitter_neighbors(shape, config.jitter)).collect();
+        Ok(Self { shapes, pairs, jitter, config })
+    }
+
+    /// Number of ordered pairs.
+    pub fn n_pairs(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Minibatch number `index` of the run: one pair or several.
+    pub fn batch(&self, index: u64) -> Vec<PairBatch> {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed);
+        rng.set_stream(index + 1);
+        (0..self.config.pairs).map(|_| self.pair(&mut rng)).collect()
+    }
+
+    fn pair(&self, rng: &mut ChaCha8Rng) -> PairBatch {
+        let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
+        let points = self.draw(&self.shapes[source], &self.shapes[target], rng);
+        let negatives = if self.config.loss == LossKind::Siamese { negatives(points.len(), rng) } else { Vec::new() };
+        PairBatch {
+            source: self.sample(source, &points, rng),
+            target: self.sample(target, &points, rng),
+            negatives,
+        }
+    }
+
+    /// Draws common points of the pools without replacement, ascending.
+    fn draw(&self, source: &PreparedShape, target: &PreparedShape, rng: &mut ChaCha8Rng) -> Vec<u32> {
+        let common = common_points(source, target);
+        let count = self.config.points.min(common.len());
+        let area = |&point: &u32| target.shape.basis.mass[target.points[point as usize] as usize];
+        let mut points: Vec<u32> = match self.config.sampling {
+            Sampling::Uniform => common.choose_multiple(rng, count).copied().collect(),
+            Sampling::Area => common
+                .choose_multiple_weighted(rng, count, area)
+                .expect("areas are positive and finite")
+                .copied()
+                .collect(),
+        };
+        points.sort_unstable();
+        points
+    }
+
+    fn sample(&self, shape: usize, points: &[u32], rng: &mut ChaCha8Rng) -> ShapeBatch {
+        let prepared = &self.shapes[shape];
+        let jitter = self.config.jitter.max(1);
+        let vertices: Vec<u32> = points
+            .iter()
+            .map(|&point| match jitter {
+                1 => prepared.points[point as usize],
+                _ => self.jitter[shape][point as usize * jitter + rng.random_range(0..jitter)],
+            })
+            .collect();
+        let basis = &prepared.shape.basis;
+        let area: f64 = basis.mass.iter().sum();
+        let k = self.config.k;
+        // Lengths in units of sqrt(area): eigenvectors have the unit 1 / length, masses its square.
+        let rows = |i: usize, j: usize| (basis.eigenvectors[(vertices[i] as usize, j)] * area.sqrt()) as f32;
+        ShapeBatch {
+            shot: prepared.shape.shot.select_rows(&vertices),
+            basis: Matrix::from_fn(vertices.len(), k, rows),
+            mass: vertices.iter().map(|&v| (basis.mass[v as usize] / area) as f32).collect(),
+            eigenvalues: basis.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),
+            distances: prepared.pool.distances(points),
+        }
+    }
+}
+
+/// Points that are in the pools of both shapes, ascending.
+fn common_points(source: &PreparedShape, target: &PreparedShape) -> Vec<u32> {
+    let in_target = |point: &&u32| target.pool.points.binary_search(point).is_ok();
+    source.pool.points.iter().filter(in_target).copied().collect()
+}
+
+/// As many pairs of different rows as there are rows.
+fn negatives(rows: usize, rng: &mut ChaCha8Rng) -> Vec<(u32, u32)> {
+    let other = |row: usize, rng: &mut ChaCha8Rng| (row + rng.random_range(1..rows)) % rows;
+    (0..rows).map(|row| (row as u32, other(row, rng) as u32)).collect()
+}
+
+/// For each point the vertices nearest to its own, `[points, jitter]`; empty where there is no jitter.
+fn jitter_neighbors(shape: &PreparedShape, jitter: usize) -> Vec<u32> {
+    if jitter <= 1 {
+        return Vec::new();
+    }
+    let vertices = shape.shape.mesh().vertices();
+    let positions: Vec<[f64; 3]> =
+        shape.points.iter().map(|&v| vertices[if v == MISSING { 0 } else { v as usize }]).collect();
+    nearest_k_vertices(vertices, &positions, jitter)
+}
