@@ -1,6 +1,7 @@
 //! Triangle meshes: the type, what can be wrong with one, its repair and its reduction.
 
 mod geometry;
+pub mod shapes;
 pub mod vec3;
 
 use thiserror::Error;
