@@ -1,1 +1,107 @@
 //! Files: meshes, point maps, matrices; read with bounded memory, written to a temporary name and renamed.
+//!
+//! - [`read_mesh`] / [`write_mesh`]: OFF, PLY, OBJ, glTF / GLB and STL (reading only), with what they carry
+//!   besides the triangles: colours, texture coordinates, scalar fields, skin weights ([`Attributes`]).
+//! - [`read_point_map`] / [`write_point_map`]: `.txt`, `.vts`, `.npy`, `.csv`.
+//! - [`read_matrix`] / [`write_matrix`], [`read_vector`] / [`write_vector`]: NumPy's `.npy`.
+//! - [`write_atomically`]: what every writer here goes through.
+//!
+//! Vertex `i` of a file is vertex `i` of the mesh read from it, and the other way round. No reader panics on
+//! any bytes, nor takes memory beyond a small multiple of the file's size, whatever its header promises.
+//!
+//! ```
+//! use fmnet::io::{Attributes, read_mesh, write_mesh};
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("triangle.off");
+//! std::fs::write(&path, "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")?;
+//! let file = read_mesh(&path)?;
+//! assert_eq!((file.mesh.n_vertices(), file.mesh.n_faces()), (3, 1));
+//! write_mesh(&folder.path().join("triangle.ply"), &file.mesh, &Attributes::default())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod assemble;
+mod atomic;
+mod attributes;
+mod error;
+mod format;
+mod gltf;
+mod matrix;
+mod obj;
+mod off;
+mod ply;
+mod point_map;
+mod stl;
+mod text;
+
+#[cfg(test)]
+mod hostile;
+
+use std::path::Path;
+
+pub use atomic::write_atomically;
+pub use attributes::{Attributes, Joint, MeshFile, ReadInfo, Skin, Texture};
+pub use error::{IoError, Position};
+pub use format::MeshFormat;
+pub use matrix::{NpyNumber, read_matrix, read_vector, write_matrix, write_vector};
+pub use point_map::{PointMapFormat, read_point_map, write_point_map};
+
+use crate::Mesh;
+use error::Parsed;
+
+/// Reads a mesh and its attributes; the format is the extension's, or the content's where the extension is
+/// not one of [`MeshFormat`].
+///
+/// Polygons are split into triangle fans, several objects are concatenated in file order. What could not be
+/// kept is said in [`ReadInfo::warnings`].
+pub fn read_mesh(path: &Path) -> Result<MeshFile, IoError> {
+    let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
+    decode_mesh(&bytes, path)
+}
+
+/// [`read_mesh`] of bytes at hand; `path` gives the format, the name in errors and the folder in which
+/// material, buffer and texture files are looked for.
+pub fn decode_mesh(bytes: &[u8], path: &Path) -> Result<MeshFile, IoError> {
+    let format = MeshFormat::from_path(path).or_else(|| MeshFormat::from_content(bytes));
+    let format =
+        format.ok_or_else(|| IoError::UnknownFormat { path: path.into(), known: MeshFormat::READABLE })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    decode(bytes, format, folder).map_err(|e| e.in_file(path))
+}
+
+fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
+    match format {
+        MeshFormat::Off => off::read(bytes),
+        MeshFormat::Ply => ply::read(bytes, folder),
+        MeshFormat::Obj => obj::read(bytes, folder),
+        MeshFormat::Gltf | MeshFormat::Glb => gltf::read(bytes, folder),
+        MeshFormat::Stl => stl::read(bytes),
+    }
+}
+
+/// Writes a mesh with what the format can hold of its attributes; the extension decides:
+///
+/// | | vertices | colours | texture | scalars | skin |
+/// |---|---|---|---|---|---|
+/// | `.off` | exact | yes | | | |
+/// | `.ply` (binary) | exact | yes | per corner, reference | yes | |
+/// | `.obj` (+ `.mtl`) | exact | yes, without alpha | per corner, reference | | |
+/// | `.glb` | rounded to f32 | yes | per corner, embedded | yes | yes |
+///
+/// Vertex `i` of the mesh is vertex `i` of the file. GLB has texture coordinates per vertex only, so a vertex on a
+/// seam is repeated there, behind the `n` vertices of the mesh. An embedded texture is written beside a `.ply`
+/// or `.obj` as `STEM_texture.png` (or `.jpg`).
+pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
+    attributes.check(mesh).map_err(|(problem, remedy)| IoError::Unwritable {
+        path: path.into(),
+        problem,
+        remedy,
+    })?;
+    match MeshFormat::from_path(path) {
+        Some(MeshFormat::Off) => off::write(path, mesh, attributes),
+        Some(MeshFormat::Ply) => ply::write(path, mesh, attributes),
+        Some(MeshFormat::Obj) => obj::write(path, mesh, attributes),
+        Some(MeshFormat::Glb) => gltf::write(path, mesh, attributes),
+        _ => Err(IoError::UnknownFormat { path: path.into(), known: MeshFormat::WRITABLE }),
+    }
+}

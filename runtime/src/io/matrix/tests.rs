@@ -1,0 +1,95 @@
+use super::*;
+use npyz::WriterBuilder;
+
+/// A file written by another implementation of the format.
+fn reference<T: npyz::AutoSerialize + Copy>(shape: &[u64], order: npyz::Order, data: &[T]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order).writer(&mut bytes);
+    let mut writer = options.begin_nd().unwrap();
+    writer.extend(data.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn reads_what_another_writer_writes() {
+    let expected = Matrix::from_fn(2, 3, |i, j| (10 * i + j) as f64);
+    let rows = [0.0, 1.0, 2.0, 10.0, 11.0, 12.0];
+    let columns = [0.0, 10.0, 1.0, 11.0, 2.0, 12.0];
+    assert_eq!(decode::<f64>(&reference(&[2, 3], npyz::Order::C, &rows)).unwrap(), expected);
+    assert_eq!(decode::<f64>(&reference(&[2, 3], npyz::Order::Fortran, &columns)).unwrap(), expected);
+    let single = rows.map(|x| x as f32);
+    assert_eq!(decode::<f64>(&reference(&[2, 3], npyz::Order::C, &single)).unwrap(), expected);
+    assert_eq!(
+        decode::<f32>(&reference(&[2, 3], npyz::Order::C, &rows)).unwrap(),
+        expected.map(|x| x as f32)
+    );
+    let integers = rows.map(|x| x as i64);
+    assert_eq!(
+        decode::<i32>(&reference(&[6], npyz::Order::C, &integers)).unwrap().into_data(),
+        [0, 1, 2, 10, 11, 12]
+    );
+    assert_eq!(decode::<f64>(&reference(&[2, 3], npyz::Order::C, &integers)).unwrap(), expected);
+}
+
+#[test]
+fn another_reader_reads_what_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npy");
+    write_matrix(&path, &Matrix::from_vec(2, 2, vec![1.0f32, 2.0, 3.0, 4.0])).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let file = npyz::NpyFile::new(&bytes[..]).unwrap();
+    assert_eq!((file.shape(), file.order()), (&[2, 2][..], npyz::Order::C));
+    assert_eq!(file.into_vec::<f32>().unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!((bytes.len() - 16) % 64, 0);
+
+    write_vector(&path, &[1, -1]).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    assert_eq!(npyz::NpyFile::new(&bytes[..]).unwrap().shape(), [2]);
+    assert_eq!(read_vector::<i32>(&path).unwrap(), [1, -1]);
+    assert_eq!(read_matrix::<f64>(&path).unwrap(), Matrix::from_vec(2, 1, vec![1.0, -1.0]));
+}
+
+fn with_header(dictionary: &str, body: &[u8]) -> Vec<u8> {
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((dictionary.len() as u16).to_le_bytes());
+    bytes.extend(dictionary.as_bytes());
+    bytes.extend(body);
+    bytes
+}
+
+#[test]
+fn big_endian_numbers() {
+    let header = "{\"descr\": \">i4\", \"fortran_order\": False, \"shape\": (2,)}";
+    let bytes = with_header(header, &[0, 0, 1, 2, 255, 255, 255, 254]);
+    assert_eq!(decode::<i32>(&bytes).unwrap().into_data(), [258, -2]);
+}
+
+#[test]
+fn errors_say_what_is_supported() {
+    let message = |bytes: &[u8]| decode::<i32>(bytes).unwrap_err().in_file(Path::new("a.npy")).to_string();
+    assert!(message(b"PK").contains("does not begin as a .npy file"));
+    assert!(message(b"\x93NUMPY\x09\x00\x00\x00").contains("version 9"));
+    assert!(message(b"\x93NUMPY\x02\x00\xff\xff\xff\xff{").contains("ends within the header"));
+    let dictionary = |descr: &str, shape: &str| {
+        format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n")
+    };
+    for (descr, shape, expected) in [
+        ("'<c16'", "(1,)", "arrays of type '<c16' are"),
+        ("[('a', '<f8')]", "(1,)", "not supported"),
+        ("'\u{fc}'", "(1,)", "not supported"),
+        ("'<f8'", "(1,)", "does not fit <i4"),
+        ("'<i8'", "(1,)", "does not fit <i4"),
+        ("'<i4'", "(1, 2, 3)", "not of one or two dimensions"),
+        ("'<i4'", "()", "not of one or two dimensions"),
+        ("'<i4'", "(18446744073709551615, 18446744073709551615)", "promises [18446744073709551615"),
+        ("'<i4'", "(99999999999999999999,)", "not of one or two dimensions"),
+        ("'<i4'", "(4611686018427387905,)", "only 8 bytes follow"),
+    ] {
+        let bytes = with_header(&dictionary(descr, shape), &[0, 0, 0, 0, 1, 0, 0, 0]);
+        assert!(message(&bytes).contains(expected), "{}", message(&bytes));
+    }
+    let empty = with_header(&dictionary("'<i4'", "(0, 18446744073709551615)"), &[]);
+    assert_eq!(decode::<i32>(&empty).unwrap().cols(), usize::MAX);
+    assert!(message(&with_header("{}", &[])).contains("there is no 'descr'"));
+}

@@ -1,0 +1,208 @@
+//! Text files as bytes: lines, words and numbers, without a `String` per line.
+
+use super::error::{ParseError, Parsed, REEXPORT};
+
+/// A byte order mark that some editors put in front.
+const BOM: &[u8] = b"\xEF\xBB\xBF";
+
+/// The lines of a text file, numbered from 1, ended by `\n`, `\r\n` or (in files without any `\n`) `\r`.
+pub(super) struct Lines<'a> {
+    rest: &'a [u8],
+    end: u8,
+    number: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        let rest = bytes.strip_prefix(BOM).unwrap_or(bytes);
+        let end = if rest.contains(&b'\n') || !rest.contains(&b'\r') { b'\n' } else { b'\r' };
+        Self { rest, end, number: 0 }
+    }
+
+    /// The number of the line last returned.
+    pub(super) fn number(&self) -> usize {
+        self.number
+    }
+
+    /// How many bytes are left.
+    pub(super) fn remaining(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// The next line with anything on it before a `#`, as its words.
+    pub(super) fn next_data(&mut self) -> Option<Words<'a>> {
+        loop {
+            let line = self.next()?;
+            let data = match line.iter().position(|&b| b == b'#') {
+                Some(comment) => &line[..comment],
+                None => line,
+            };
+            if !data.trim_ascii().is_empty() {
+                return Some(Words::new(data, self.number));
+            }
+        }
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        if self.rest.is_empty() {
+            return None;
+        }
+        self.number += 1;
+        let length = self.rest.iter().position(|&b| b == self.end);
+        let (line, rest) = match length {
+            Some(length) => (&self.rest[..length], &self.rest[length + 1..]),
+            None => (self.rest, &self.rest[..0]),
+        };
+        self.rest = rest;
+        Some(line)
+    }
+}
+
+/// Words separated by white space, and the line they are on; newlines among them are counted.
+#[derive(Clone)]
+pub(super) struct Words<'a> {
+    rest: &'a [u8],
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    pub(super) fn new(bytes: &'a [u8], line: usize) -> Self {
+        Self { rest: bytes, line }
+    }
+
+    /// The line of the word last returned, 1-based.
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// What is left, unsplit.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    /// The next word, which must be a finite number.
+    pub(super) fn finite(&mut self, what: &str) -> Parsed<f64> {
+        let word = self.expect(what)?;
+        match float(word) {
+            Some(value) if value.is_finite() => Ok(value),
+            Some(_) => Err(self.error(format!("{what} is not finite: {}", quote(word)))),
+            None => Err(self.error(format!("{what} is not a number: {}", quote(word)))),
+        }
+    }
+
+    /// The next three words, which must be finite numbers.
+    pub(super) fn point(&mut self, what: &str) -> Parsed<[f64; 3]> {
+        Ok([self.finite(what)?, self.finite(what)?, self.finite(what)?])
+    }
+
+    /// The next word, which must be an integer.
+    pub(super) fn integer(&mut self, what: &str) -> Parsed<i64> {
+        let word = self.expect(what)?;
+        integer(word).ok_or_else(|| self.error(format!("{what} is not an integer: {}", quote(word))))
+    }
+
+    /// The next word, which must be a count.
+    pub(super) fn size(&mut self, what: &str) -> Parsed<usize> {
+        let value = self.integer(what)?;
+        usize::try_from(value).map_err(|_| self.error(format!("{what} is {value}, which is negative")))
+    }
+
+    /// The next word, which must be the 0-based index of one of `n` things.
+    pub(super) fn index(&mut self, what: &str, n: usize) -> Parsed<u32> {
+        let value = self.integer(what)?;
+        if value < 0 || value as u64 >= n as u64 {
+            return Err(self.error(format!("{what} {value} is out of range: there are {n}, counted from 0")));
+        }
+        u32::try_from(value).map_err(|_| self.error(format!("{what} {value} does not fit 32 bits")))
+    }
+
+    pub(super) fn expect(&mut self, what: &str) -> Parsed<&'a [u8]> {
+        self.next()
+            .ok_or_else(|| ParseError::line(self.line, format!("{what} is missing at the end of the line")))
+    }
+
+    pub(super) fn error(&self, problem: impl Into<String>) -> ParseError {
+        ParseError::new(super::Position::Line(self.line), problem, REEXPORT)
+    }
+}
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let start = self.rest.iter().position(|b| {
+            self.line += usize::from(*b == b'\n');
+            !b.is_ascii_whitespace()
+        });
+        let word = &self.rest[start.unwrap_or(self.rest.len())..];
+        let length = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
+        self.rest = &word[length..];
+        (length > 0).then(|| &word[..length])
+    }
+}
+
+/// A decimal number, `nan` and `inf` included.
+pub(super) fn float(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// A decimal integer, also one written as `3.0` or `3.0e0`, as NumPy's `savetxt` does.
+pub(super) fn integer(word: &[u8]) -> Option<i64> {
+    let digits = word.strip_prefix(b"-").unwrap_or(word);
+    if !digits.is_empty() && digits.len() < 18 && digits.iter().all(u8::is_ascii_digit) {
+        let value = digits.iter().fold(0i64, |value, b| value * 10 + i64::from(b - b'0'));
+        return Some(if digits.len() < word.len() { -value } else { value });
+    }
+    let value = float(word)?;
+    (value.fract() == 0.0 && value.abs() < 9.0e15).then_some(value as i64)
+}
+
+/// A word for an error message: shortened, without control characters.
+pub(super) fn quote(word: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&word[..word.len().min(40)]);
+    let text = text.replace(char::is_control, "\u{fffd}");
+    format!("'{text}{}'", if word.len() > 40 { "..." } else { "" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_every_system_are_numbered() {
+        for text in ["a\n\nb\n", "a\r\n\r\nb", "a\r\rb\r"] {
+            let mut lines = Lines::new(text.as_bytes());
+            assert_eq!(lines.next_data().unwrap().next(), Some(&b"a"[..]));
+            assert_eq!(lines.next_data().unwrap().next(), Some(&b"b"[..]));
+            assert_eq!(lines.number(), 3);
+            assert!(lines.next_data().is_none());
+        }
+    }
+
+    #[test]
+    fn words_count_the_lines_they_cross() {
+        let mut words = Words::new(b" a b\n\n  c \n", 5);
+        assert_eq!(words.by_ref().take(2).count(), 2);
+        assert_eq!(words.line(), 5);
+        assert_eq!((words.next(), words.line()), (Some(&b"c"[..]), 7));
+        assert_eq!(words.next(), None);
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!(integer(b"-12"), Some(-12));
+        assert_eq!(integer(b"+12"), Some(12));
+        assert_eq!(integer(b"1.2e1"), Some(12));
+        assert_eq!(integer(b"1.5"), None);
+        assert_eq!(integer(b"-"), None);
+        assert_eq!(integer(b"99999999999999999999"), None);
+        assert_eq!(float(b"1e-3"), Some(1e-3));
+        assert!(Words::new(b"nan", 1).finite("x").is_err());
+        assert!(Words::new(b"7", 1).index("vertex", 7).is_err());
+        assert_eq!(quote(b"\x1b[31m"), "'\u{fffd}[31m'");
+    }
+}
