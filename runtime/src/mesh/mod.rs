@@ -2,7 +2,11 @@
 
 mod geometry;
 pub mod shapes;
+mod topology;
+mod union_find;
 pub mod vec3;
+
+pub use topology::{Adjacency, Components, Fans, NONE, Topology};
 
 use thiserror::Error;
 
