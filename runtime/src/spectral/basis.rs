@@ -1,7 +1,15 @@
 //! The truncated Laplacian eigenbasis of a shape.
 
 use crate::Matrix;
+use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows converted to f64 at a time.
+const ROWS_PER_BLOCK: usize = 512;
+/// Most partial sums of a projection.
+const MAX_TASKS: usize = 16;
 
 /// The first `k` eigenpairs of `W phi = lambda A phi`, with `Phi^T A Phi = I`.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,21 +43,68 @@ impl Eigenbasis {
     }
 
     /// Fourier coefficients `Phi^T A F`, `[k, q]`, of the functions `F`, `[n, q]`.
+    ///
+    /// Multi-threaded, the same bytes for any number of threads; `F` is converted to f64 block by block.
+    ///
+    /// # Panics
+    /// If `functions` has not `n` rows, which is a bug of the caller.
     pub fn project(&self, functions: &Matrix<f32>) -> Matrix {
         assert_eq!(functions.rows(), self.n(), "functions and basis live on different meshes");
-        let mut weighted = functions.map(f64::from);
-        for (i, &area) in self.mass.iter().enumerate() {
-            weighted.row_mut(i).iter_mut().for_each(|x| *x *= area);
+        let blocks = self.n().div_ceil(ROWS_PER_BLOCK);
+        let tasks = blocks.clamp(1, MAX_TASKS);
+        let parts: Vec<Matrix> = (0..tasks)
+            .into_par_iter()
+            .map(|task| self.project_blocks(functions, task * blocks / tasks..(task + 1) * blocks / tasks))
+            .collect();
+        parts.into_iter().reduce(add).expect("there is at least one task")
+    }
+
+    /// The part of the projection that comes from the given blocks of rows, `[k, q]`.
+    fn project_blocks(&self, functions: &Matrix<f32>, blocks: Range<usize>) -> Matrix {
+        let q = functions.cols();
+        let mut sum = Matrix::zeros(self.k(), q);
+        for block in blocks {
+            let first = block * ROWS_PER_BLOCK;
+            let rows = ROWS_PER_BLOCK.min(self.n() - first);
+            let mut weighted = Matrix::zeros(rows, q);
+            for r in 0..rows {
+                let area = self.mass[first + r];
+                let values = functions.row(first + r);
+                weighted.row_mut(r).iter_mut().zip(values).for_each(|(w, &f)| *w = area * f64::from(f));
+            }
+            let phi = self.eigenvectors.as_faer().subrows(first, rows);
+            matmul(sum.as_faer_mut(), Accum::Add, phi.transpose(), weighted.as_faer(), 1.0, Par::Seq);
         }
-        let mut coefficients = Matrix::zeros(self.k(), functions.cols());
-        faer::linalg::matmul::matmul(
-            coefficients.as_faer_mut(),
-            Accum::Replace,
-            self.eigenvectors.as_faer().transpose(),
-            weighted.as_faer(),
-            1.0,
-            Par::Seq,
-        );
-        coefficients
+        sum
+    }
+}
+
+fn add(mut total: Matrix, part: Matrix) -> Matrix {
+    total.data_mut().iter_mut().zip(part.data()).for_each(|(t, p)| *t += p);
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn projection_is_the_weighted_inner_product() {
+        let n = 3 * ROWS_PER_BLOCK + 17;
+        let wave = |i: usize, j: usize| ((i * (j + 3)) as f64 * 0.1).sin();
+        let basis = Eigenbasis {
+            eigenvalues: vec![0.0; 4],
+            eigenvectors: Matrix::from_fn(n, 4, wave),
+            mass: (0..n).map(|i| 1.0 + (i % 7) as f64).collect(),
+        };
+        let functions = Matrix::from_fn(n, 5, |i, j| wave(i, j + 7) as f32);
+        let coefficients = basis.project(&functions);
+        for a in 0..4 {
+            for b in 0..5 {
+                let expected: f64 =
+                    (0..n).map(|i| basis.mass[i] * wave(i, a) * f64::from(functions[(i, b)])).sum();
+                assert!((coefficients[(a, b)] - expected).abs() < 1e-9);
+            }
+        }
     }
 }

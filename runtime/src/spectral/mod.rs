@@ -1,5 +1,20 @@
 //! The Laplace-Beltrami operator and its eigenbasis.
+//!
+//! [`Laplacian::new`] discretises the operator on a mesh as the pair of a stiffness matrix `W` and a lumped
+//! mass `A`; [`eigenbasis`] finds the smallest eigenpairs of `W phi = lambda A phi`.
 
 mod basis;
+mod eigen;
+mod laplacian;
+mod mass;
+mod sparse;
+mod stiffness;
+#[cfg(test)]
+mod test_shapes;
 
 pub use basis::Eigenbasis;
+pub use eigen::{EigenError, EigenInfo, EigenOptions, eigenbasis};
+pub use laplacian::Laplacian;
+pub use mass::lumped_mass;
+pub use sparse::SparseMatrix;
+pub use stiffness::cotangent_stiffness;
