@@ -1,0 +1,58 @@
+//! A map from vertices to vertices.
+
+/// A point map `T: source -> target`: for each source vertex a target vertex, or none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointMap {
+    /// The target vertex of each source vertex, `[n_source]`, 0-based; [`PointMap::UNMATCHED`] where there is none.
+    pub targets: Vec<u32>,
+    /// How far each match can be trusted, `[n_source]`, from 0 to 1.
+    pub confidence: Option<Vec<f32>>,
+    /// Number of target vertices.
+    pub n_target: usize,
+}
+
+impl PointMap {
+    /// Stands for the target of a source vertex that has none.
+    pub const UNMATCHED: u32 = u32::MAX;
+
+    /// A map without confidences.
+    pub fn new(targets: Vec<u32>, n_target: usize) -> Self {
+        Self { targets, confidence: None, n_target }
+    }
+
+    /// Number of source vertices.
+    pub fn len(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// Whether there are no source vertices.
+    pub fn is_empty(&self) -> bool {
+        self.targets.is_empty()
+    }
+
+    /// The target vertex of source vertex `source`, if it has one.
+    ///
+    /// # Panics
+    /// If there is no such source vertex.
+    pub fn get(&self, source: usize) -> Option<u32> {
+        Some(self.targets[source]).filter(|&target| target != Self::UNMATCHED)
+    }
+
+    /// The target of each source vertex in turn.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<u32>> + '_ {
+        self.targets.iter().map(|&target| Some(target).filter(|&target| target != Self::UNMATCHED))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unmatched_vertices_have_no_target() {
+        let map = PointMap::new(vec![1, PointMap::UNMATCHED], 2);
+        assert_eq!((map.len(), map.is_empty()), (2, false));
+        assert_eq!((map.get(0), map.get(1)), (Some(1), None));
+        assert_eq!(map.iter().collect::<Vec<_>>(), [Some(1), None]);
+    }
+}
