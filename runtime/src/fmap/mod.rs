@@ -1,1 +1,191 @@
 //! Functional maps: least squares, the regularised solve, soft correspondence.
+//!
+//! A functional map `C`, `[k_target, k_source]`, takes the Fourier coefficients of a function on the source to those
+//! of the corresponding function on the target. From descriptors with coefficients `F^ = Phi^T A F`,
+//! `[k_source, q]`, and `G^`, `[k_target, q]`, it is the solution of `C F^ = G^` in the sense of a [`FmapSolver`].
+
+mod adjoint;
+mod dense;
+mod least_squares;
+mod regularized;
+mod soft;
+
+use crate::Matrix;
+use crate::spectral::Eigenbasis;
+use thiserror::Error;
+
+pub use adjoint::functional_map_of;
+pub use least_squares::{LeastSquaresOptions, least_squares};
+pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
+pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
+
+pub(crate) use dense::{multiply, thin_svd};
+
+/// How a functional map is computed from descriptors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FmapSolver {
+    /// The paper's: all coefficients by least squares, [`least_squares`].
+    LeastSquares,
+    /// With the resolvent mask, which asks the map to commute with the Laplacians, [`regularized`].
+    Regularized {
+        /// Weight of the mask, relative to the mean diagonal of `F^ F^T`. Range 0 (plain least squares) upwards, default
+        /// [`FmapSolver::DEFAULT_MASK_WEIGHT`]. A stronger mask, 1.0, helps across different connectivities.
+        weight: f64,
+    },
+}
+
+impl FmapSolver {
+    /// The weight of the mask that models are trained with.
+    pub const DEFAULT_MASK_WEIGHT: f64 = 0.1;
+}
+
+/// What a solve found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FmapInfo {
+    /// Number of independent directions kept in the worst conditioned system, at most `k_source`.
+    pub rank: usize,
+    /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of `F^`, infinite where
+    /// `F^` has linearly dependent rows; for the regularised solve a lower bound, from the pivots, of that of the worst row's system.
+    pub condition: f64,
+    /// `||C F^ - G^||_F / ||G^||_F`; 0 where `G^` is zero.
+    pub relative_residual: f64,
+}
+
+/// Why a functional map cannot be computed.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum FmapError {
+    /// Source and target have different numbers of descriptors.
+    #[error(
+        "the source has {source_count} descriptors but the target {target_count}; compute both with the same options"
+    )]
+    DescriptorCount {
+        /// Descriptors of the source.
+        source_count: usize,
+        /// Descriptors of the target.
+        target_count: usize,
+    },
+    /// An array does not fit the others.
+    #[error("{what} has length {found}, expected {expected}")]
+    SizeMismatch {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that fits.
+        expected: usize,
+    },
+    /// A basis or the descriptors have no entries.
+    #[error("{what} is empty; a functional map needs at least one eigenfunction and one descriptor")]
+    Empty {
+        /// What is empty.
+        what: &'static str,
+    },
+    /// An entry is NaN or infinite.
+    #[error("row {row} of {what} has an entry that is not finite; check the mesh and the descriptors")]
+    NotFinite {
+        /// The matrix.
+        what: &'static str,
+        /// The row, 0-based.
+        row: usize,
+    },
+    /// The weight of the mask is negative, infinite or not a number.
+    #[error("the weight of the mask is {weight}, but must be a finite number, 0 or more")]
+    BadWeight {
+        /// The weight.
+        weight: f64,
+    },
+    /// A point map names a vertex that does not exist.
+    #[error(
+        "source vertex {vertex} is matched to target vertex {target}, but the target has {n_target} vertices (0-based)"
+    )]
+    TargetOutOfRange {
+        /// The source vertex.
+        vertex: usize,
+        /// What it is matched to.
+        target: u32,
+        /// Number of target vertices.
+        n_target: usize,
+    },
+    /// The dense soft correspondence would not fit the memory allowed.
+    #[error(
+        "a dense soft correspondence of {n_target} x {n_source} takes {needed} bytes, more than the {allowed} allowed; \
+         raise the limit or use the peaks, which need no such matrix"
+    )]
+    TooLarge {
+        /// Number of target vertices.
+        n_target: usize,
+        /// Number of source vertices.
+        n_source: usize,
+        /// Bytes it would take.
+        needed: usize,
+        /// Bytes allowed.
+        allowed: usize,
+    },
+    /// A decomposition did not converge, which finite input does not cause.
+    #[error(
+        "the singular value decomposition of a {rows} x {cols} matrix did not converge; check the scale of the descriptors"
+    )]
+    NoConvergence {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Columns of the matrix.
+        cols: usize,
+    },
+}
+
+/// The functional map `C`, `[k_target, k_source]`, that takes the descriptors' coefficients `f_hat`, `[k_source, q]`,
+/// to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
+pub fn functional_map(
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    f_hat: &Matrix,
+    g_hat: &Matrix,
+    solver: FmapSolver,
+) -> Result<(Matrix, FmapInfo), FmapError> {
+    check_length("a column of the source's coefficients", f_hat.rows(), basis_source.k())?;
+    check_length("a column of the target's coefficients", g_hat.rows(), basis_target.k())?;
+    match solver {
+        FmapSolver::LeastSquares => least_squares(f_hat, g_hat, &LeastSquaresOptions::default()),
+        FmapSolver::Regularized { weight } => {
+            let eigenvalues_source = scale_free_eigenvalues(basis_source);
+            let eigenvalues_target = scale_free_eigenvalues(basis_target);
+            regularized(f_hat, g_hat, &eigenvalues_source, &eigenvalues_target, weight)
+        }
+    }
+}
+
+/// Checks that `f_hat`, `[k_source, q]`, and `g_hat`, `[k_target, q]`, make a system.
+fn check_system(f_hat: &Matrix, g_hat: &Matrix) -> Result<(), FmapError> {
+    if f_hat.cols() != g_hat.cols() {
+        return Err(FmapError::DescriptorCount { source_count: f_hat.cols(), target_count: g_hat.cols() });
+    }
+    for (matrix, what) in
+        [(f_hat, "the source's coefficient matrix"), (g_hat, "the target's coefficient matrix")]
+    {
+        if matrix.data().is_empty() {
+            return Err(FmapError::Empty { what });
+        }
+        if let Some(entry) = matrix.data().iter().position(|x| !x.is_finite()) {
+            return Err(FmapError::NotFinite { what, row: entry / matrix.cols() });
+        }
+    }
+    Ok(())
+}
+
+fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), FmapError> {
+    if found == expected { Ok(()) } else { Err(FmapError::SizeMismatch { what, found, expected }) }
+}
+
+/// `||C F^ - G^||_F / ||G^||_F`.
+fn relative_residual(c: &Matrix, f_hat: &Matrix, g_hat: &Matrix) -> f64 {
+    let image = multiply(c.as_faer(), f_hat.as_faer());
+    let squared = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>();
+    let missed = squared(&mut image.data().iter().zip(g_hat.data()).map(|(a, b)| a - b));
+    let whole = squared(&mut g_hat.data().iter().copied());
+    if whole == 0.0 { 0.0 } else { (missed / whole).sqrt() }
+}
+
+#[cfg(test)]
+pub(crate) mod test_basis;
+#[cfg(test)]
+mod tests;

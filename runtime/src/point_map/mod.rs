@@ -1,5 +1,10 @@
 //! From a functional map to a point map: exact nearest neighbours in the spectral embedding.
 
+mod recover;
+pub mod search;
 mod types;
 
+pub use recover::{Comparison, RecoverError, recover, recover_by};
 pub use types::PointMap;
+
+pub(crate) use recover::{transport, transposed};

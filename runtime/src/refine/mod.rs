@@ -1,1 +1,54 @@
 //! Refinement of a map: spectral ICP, ZoomOut, the product manifold filter.
+
+mod icp;
+mod sampling;
+mod zoomout;
+
+use crate::Matrix;
+use crate::fmap::FmapError;
+use crate::point_map::{PointMap, RecoverError, search::SearchError};
+use thiserror::Error;
+
+pub use icp::{IcpInfo, IcpOptions, icp};
+pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
+
+/// A refined map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refined<Info> {
+    /// The point map from the source to the target.
+    pub map: PointMap,
+    /// The functional map it was recovered from, `[k_target, k_source]`.
+    pub functional_map: Matrix,
+    /// What the refinement did.
+    pub info: Info,
+}
+
+/// Why a map cannot be refined.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum RefineError {
+    /// An option is out of its range.
+    #[error("{option} is {value}, but must be {range}")]
+    Option {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: usize,
+        /// The values allowed.
+        range: String,
+    },
+    /// Not one source vertex has a match to start from.
+    #[error("no source vertex is matched; refinement improves a map, it cannot start without one")]
+    NothingMatched,
+    /// The functional map of an intermediate point map cannot be computed.
+    #[error(transparent)]
+    Fmap(#[from] FmapError),
+    /// The point map of an intermediate functional map cannot be recovered.
+    #[error(transparent)]
+    Recover(#[from] RecoverError),
+    /// The nearest neighbour search failed.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+}
+
+#[cfg(test)]
+mod tests;

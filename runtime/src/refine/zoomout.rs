@@ -1,0 +1,163 @@
+//! ZoomOut (Melzi et al. 2019): spectral upsampling of a map.
+
+use super::sampling::farthest_points;
+use super::{RefineError, Refined};
+use crate::Matrix;
+use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares};
+use crate::point_map::search::nearest_rows;
+use crate::point_map::{PointMap, transport, transposed};
+use crate::spectral::Eigenbasis;
+
+/// Options of [`zoomout`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ZoomOutOptions {
+    /// Eigenfunctions in the first round. Range 1 and up, default 30; what the initial map gets right.
+    pub k_start: usize,
+    /// Eigenfunctions added from round to round. Range 1 and up, default 10; smaller is slower and a little better.
+    pub k_step: usize,
+    /// Eigenfunctions in the last round. Range `k_start` and up, default 200; fewer where a basis has fewer.
+    pub k_max: usize,
+    /// Which vertices take part before the last round. Default [`ZoomOutSamples::All`].
+    pub samples: ZoomOutSamples,
+}
+
+impl Default for ZoomOutOptions {
+    fn default() -> Self {
+        Self { k_start: 30, k_step: 10, k_max: 200, samples: ZoomOutSamples::All }
+    }
+}
+
+/// Which vertices take part in the rounds before the last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ZoomOutSamples {
+    /// All of both shapes.
+    All,
+    /// So many of each shape, evenly spread, at least; never fewer than three times the eigenfunctions of the last round. The last round takes
+    /// all vertices.
+    Farthest(usize),
+}
+
+/// What [`zoomout`] did.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ZoomOutInfo {
+    /// The number of eigenfunctions in each round.
+    pub rounds: Vec<usize>,
+    /// The vertices of source and target that took part before the last round.
+    pub samples: [usize; 2],
+}
+
+/// Refines a point map by alternating between it and its functional map while the number of eigenfunctions `k` grows.
+///
+/// A round takes the functional map of the point map at `k`, `C = Psi_k[T]^T A Phi_k`, and from it the point map again:
+/// `T(x)` is the `y` for which `C^T psi_k(y)`, the delta function at `y` pulled back to the source, is nearest to `phi_k(x)`. That is the
+/// paper's direction: its functional map is `C^T`. Comparing `C phi(x)` with `psi(y)` on the target instead looks as good but is
+/// much worse (mean error 2.4 instead of 1.1 on a pair of FAUST shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short
+/// rows of `Psi`. Source vertices without a match in `map` have one afterwards.
+pub fn zoomout(
+    map: &PointMap,
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    options: &ZoomOutOptions,
+) -> Result<Refined<ZoomOutInfo>, RefineError> {
+    let rounds = rounds(options, basis_source.k().min(basis_target.k()))?;
+    // Checks the whole point map, whatever the first round will use of it.
+    functional_map_of(map, &basis_source.truncated(1), &basis_target.truncated(1))?;
+    if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
+        return Err(RefineError::NothingMatched);
+    }
+    let last = rounds[rounds.len() - 1];
+    if let ZoomOutSamples::Farthest(count) = options.samples {
+        let count = count.max(3 * last);
+        let source = farthest_points(basis_source, count);
+        let target = farthest_points(basis_target, count);
+        if let Some(map) = on_samples(basis_source, basis_target, map, &rounds, &source, &target)? {
+            let (map, functional_map) = round(last, basis_source, basis_target, &map)?;
+            let info = ZoomOutInfo { rounds, samples: [source.len(), target.len()] };
+            return Ok(Refined { map, functional_map, info });
+        }
+    }
+    let (mut map, mut functional_map) = (map.clone(), Matrix::default());
+    for &k in &rounds {
+        (map, functional_map) = round(k, basis_source, basis_target, &map)?;
+    }
+    let info = ZoomOutInfo { rounds, samples: [basis_source.n(), basis_target.n()] };
+    Ok(Refined { map, functional_map, info })
+}
+
+/// One round on all vertices.
+fn round(
+    k: usize,
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    map: &PointMap,
+) -> Result<(PointMap, Matrix), RefineError> {
+    let (basis_source, basis_target) = (basis_source.truncated(k), basis_target.truncated(k));
+    let c = functional_map_of(map, &basis_source, &basis_target)?;
+    let targets = pulled_back_nearest(&basis_source.eigenvectors, &basis_target.eigenvectors, &c)?;
+    Ok((PointMap::new(targets, basis_target.n()), c))
+}
+
+/// For each row `phi(x)` the `y` with the nearest `C^T psi(y)`.
+fn pulled_back_nearest(phi: &Matrix, psi: &Matrix, c: &Matrix) -> Result<Vec<u32>, RefineError> {
+    let pulled_back = transport(psi, &transposed(c));
+    Ok(nearest_rows(phi, &pulled_back)?.index)
+}
+
+/// All rounds on samples, then the point map of all vertices; `None` if too few of the samples are matched.
+///
+/// On samples the eigenvectors are not orthonormal, so that the functional map of a round is the least squares solution of
+/// `C phi(x) = psi(T(x))` over the sampled `x`; over all vertices, weighted by area, that is what [`functional_map_of`] gives.
+fn on_samples(
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    map: &PointMap,
+    rounds: &[usize],
+    source: &[u32],
+    target: &[u32],
+) -> Result<Option<PointMap>, RefineError> {
+    let matched: Vec<u32> = source.iter().copied().filter(|&x| map.get(x as usize).is_some()).collect();
+    if matched.len() < 2 * rounds[0] {
+        return Ok(None);
+    }
+    let images: Vec<u32> = matched.iter().map(|&x| map.targets[x as usize]).collect();
+    let (phi, psi) =
+        (basis_source.eigenvectors.select_rows(source), basis_target.eigenvectors.select_rows(target));
+    let mut phi_matched = basis_source.eigenvectors.select_rows(&matched);
+    let mut psi_matched = basis_target.eigenvectors.select_rows(&images);
+    let mut c = Matrix::default();
+    for &k in rounds {
+        c = least_squares_map(&phi_matched.first_cols(k), &psi_matched.first_cols(k))?;
+        let nearest = pulled_back_nearest(&phi.first_cols(k), &psi.first_cols(k), &c)?;
+        psi_matched = psi.select_rows(&nearest);
+        phi_matched.clone_from(&phi);
+    }
+    let k = c.rows();
+    let (phi, psi) = (basis_source.eigenvectors.first_cols(k), basis_target.eigenvectors.first_cols(k));
+    let targets = pulled_back_nearest(&phi, &psi, &c)?;
+    Ok(Some(PointMap::new(targets, basis_target.n())))
+}
+
+/// The `C`, `[k, k]`, that minimises `sum |C phi(x) - psi(x)|^2` over the rows of `phi` and `psi`, `[m, k]`.
+fn least_squares_map(phi: &Matrix, psi: &Matrix) -> Result<Matrix, RefineError> {
+    Ok(least_squares(&transposed(phi), &transposed(psi), &LeastSquaresOptions::default())?.0)
+}
+
+fn rounds(options: &ZoomOutOptions, k_available: usize) -> Result<Vec<usize>, RefineError> {
+    let bad = |option, value, range: &str| RefineError::Option { option, value, range: range.to_string() };
+    if options.k_start == 0 {
+        return Err(bad("k_start", 0, "at least 1"));
+    }
+    if options.k_step == 0 {
+        return Err(bad("k_step", 0, "at least 1"));
+    }
+    if options.k_max < options.k_start {
+        return Err(bad("k_max", options.k_max, &format!("at least k_start, {}", options.k_start)));
+    }
+    if k_available == 0 {
+        return Err(bad("the number of eigenfunctions", 0, "at least 1"));
+    }
+    let last = options.k_max.min(k_available);
+    let mut rounds: Vec<usize> = (options.k_start..last).step_by(options.k_step).collect();
+    rounds.push(last);
+    Ok(rounds)
+}
