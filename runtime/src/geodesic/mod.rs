@@ -20,6 +20,8 @@
 mod exact;
 mod graph;
 mod local;
+#[cfg(test)]
+mod reference_tests;
 mod search;
 mod solver;
 mod surface;
