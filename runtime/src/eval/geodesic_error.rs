@@ -1,0 +1,115 @@
+//! The geodesic error of a point map (Kim, Lipman and Funkhouser 2011, "Blended intrinsic maps").
+
+use super::{ErrorSummary, EvalError, GroundTruth, check_size};
+use crate::geodesic::GeodesicSolver;
+use crate::point_map::PointMap;
+
+/// Normalised geodesic error `d_Y(y, y*) / sqrt(area(Y))` of each correct match `(x, y*)` of the ground truth, in its
+/// order, where the map sends `x` to `y`.
+///
+/// `solver` and `area` belong to the target mesh. The error is NaN where the map leaves `x` unmatched and infinite
+/// where `y` and `y*` are on different components; [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say how
+/// they count these.
+pub fn geodesic_errors(
+    map: &PointMap,
+    ground_truth: &GroundTruth,
+    solver: &GeodesicSolver,
+    area: f64,
+) -> Result<Vec<f32>, EvalError> {
+    check_size("the map", map.len(), "the source of the ground truth", ground_truth.n_source())?;
+    check_size("the target of the map", map.n_target, "the target mesh", solver.n_vertices())?;
+    check_size(
+        "the target of the ground truth",
+        ground_truth.n_target(),
+        "the target mesh",
+        solver.n_vertices(),
+    )?;
+    let n_vertices = solver.n_vertices();
+    if let Some(index) = map.iter().flatten().find(|&y| y as usize >= n_vertices) {
+        return Err(EvalError::IndexOutOfRange { what: "the map", side: "target", index, n_vertices });
+    }
+    let matches = || ground_truth.pairs().iter().map(|&(x, y_true)| (map.get(x as usize), y_true));
+    let found: Vec<(u32, u32)> = matches().filter_map(|(y, y_true)| Some((y?, y_true))).collect();
+    let mut distances = solver.pair_distances(&found).into_iter();
+    let scale = area.sqrt();
+    let error = |distance: f32| (f64::from(distance) / scale) as f32;
+    Ok(matches().map(|(y, _)| y.and_then(|_| distances.next()).map_or(f32::NAN, error)).collect())
+}
+
+/// The errors under the better of two ground truths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SymmetricErrors {
+    /// Errors under the better one, in the order of its pairs.
+    pub errors: Vec<f32>,
+    /// Whether that is the mirrored one.
+    pub is_mirrored: bool,
+}
+
+/// Errors of a map between shapes with a symmetry, for which the mirrored map is as good: those under whichever of the
+/// two ground truths has the smaller mean error, chosen once for the whole map.
+pub fn symmetric_geodesic_errors(
+    map: &PointMap,
+    ground_truth: &GroundTruth,
+    mirrored: &GroundTruth,
+    solver: &GeodesicSolver,
+    area: f64,
+) -> Result<SymmetricErrors, EvalError> {
+    let direct = geodesic_errors(map, ground_truth, solver, area)?;
+    let flipped = geodesic_errors(map, mirrored, solver, area)?;
+    let is_mirrored = ErrorSummary::new(&flipped).mean < ErrorSummary::new(&direct).mean;
+    Ok(SymmetricErrors { errors: if is_mirrored { flipped } else { direct }, is_mirrored })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Mesh;
+    use crate::geodesic::GeodesicOptions;
+
+    /// Two unit squares side by side, and a triangle apart: vertices 0-5 and 6-8.
+    fn target() -> (GeodesicSolver, f64) {
+        let mut vertices: Vec<[f64; 3]> = (0..6).map(|i| [f64::from(i % 3), f64::from(i / 3), 0.0]).collect();
+        vertices.extend([[9.0, 0.0, 0.0], [11.0, 0.0, 0.0], [9.0, 2.0, 0.0]]);
+        let faces = vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [6, 7, 8]];
+        let mesh = Mesh::new(vertices, faces).unwrap();
+        (GeodesicSolver::new(&mesh, &GeodesicOptions::default()), mesh.area())
+    }
+
+    #[test]
+    fn errors_are_distances_over_root_area() {
+        let (solver, area) = target();
+        assert_eq!(area, 4.0);
+        let map = PointMap::new(vec![0, 2, 5, PointMap::UNMATCHED, 6], 9);
+        let truth = GroundTruth::new(vec![(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (2, 5)], 5, 9).unwrap();
+        let errors = geodesic_errors(&map, &truth, &solver, area).unwrap();
+        assert_eq!(errors[..2], [0.0, 1.0]);
+        assert!((f64::from(errors[2]) - 5f64.sqrt() / 2.0).abs() < 1e-6);
+        assert!(errors[3].is_nan() && errors[4].is_infinite());
+        assert_eq!(errors[5], 0.0);
+    }
+
+    #[test]
+    fn sizes_and_indices_are_checked() {
+        let (solver, area) = target();
+        let truth = GroundTruth::identity(9);
+        let errors = |targets, n| geodesic_errors(&PointMap::new(targets, n), &truth, &solver, area);
+        assert!(matches!(errors(vec![0; 8], 9), Err(EvalError::SizeMismatch { found: 8, .. })));
+        assert!(matches!(errors(vec![0; 9], 8), Err(EvalError::SizeMismatch { found: 8, .. })));
+        assert!(matches!(errors(vec![9; 9], 9), Err(EvalError::IndexOutOfRange { index: 9, .. })));
+    }
+
+    #[test]
+    fn mirrored_map_is_as_good() {
+        let (solver, area) = target();
+        let direct = GroundTruth::new((0..6).map(|i| (i, i)).collect(), 6, 9).unwrap();
+        let mirrored =
+            GroundTruth::new((0..6).map(|i| (i, 3 * (i / 3) + 2 - i % 3)).collect(), 6, 9).unwrap();
+        let mut map = mirrored.to_map();
+        map.targets[0] = PointMap::UNMATCHED;
+        let best = symmetric_geodesic_errors(&map, &direct, &mirrored, &solver, area).unwrap();
+        assert!(best.is_mirrored && best.errors[0].is_nan());
+        assert_eq!(best.errors[1..], [0.0; 5]);
+        let best = symmetric_geodesic_errors(&direct.to_map(), &direct, &mirrored, &solver, area).unwrap();
+        assert!(!best.is_mirrored);
+    }
+}

@@ -1,0 +1,191 @@
+//! Which matches are right.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use super::EvalError;
+use crate::io::read_point_map;
+use crate::point_map::PointMap;
+
+/// Correct matches between a source and a target, as pairs of 0-based vertices.
+///
+/// Source vertices may be missing (they are left out of every figure) and may occur more than once, as in the
+/// remeshed datasets, where several vertices of the common template fall on one vertex.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundTruth {
+    pairs: Vec<(u32, u32)>,
+    n_source: usize,
+    n_target: usize,
+}
+
+/// Where a [`GroundTruth`] comes from: what `--ground-truth` takes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GroundTruthSource {
+    /// `identity`: vertex i corresponds with vertex i.
+    Identity,
+    /// `identity:N`: the first N vertices correspond, vertex i with vertex i.
+    FirstVertices(usize),
+    /// `FILE`: a map file from source to target.
+    Map(PathBuf),
+    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex).
+    Lists(PathBuf, PathBuf),
+}
+
+impl FromStr for GroundTruthSource {
+    type Err = EvalError;
+
+    fn from_str(text: &str) -> Result<Self, EvalError> {
+        let bad = || EvalError::BadGroundTruth(text.into());
+        if text == "identity" {
+            return Ok(Self::Identity);
+        }
+        if let Some(count) = text.strip_prefix("identity:") {
+            return count.parse().map(Self::FirstVertices).map_err(|_| bad());
+        }
+        match text.split(',').collect::<Vec<_>>()[..] {
+            [file] if !file.is_empty() => Ok(Self::Map(file.into())),
+            [source, target] if !source.is_empty() && !target.is_empty() => {
+                Ok(Self::Lists(source.into(), target.into()))
+            }
+            _ => Err(bad()),
+        }
+    }
+}
+
+impl GroundTruthSource {
+    /// The correct matches between meshes of `n_source` and `n_target` vertices.
+    pub fn load(&self, n_source: usize, n_target: usize) -> Result<GroundTruth, EvalError> {
+        match self {
+            Self::Identity if n_source != n_target => Err(EvalError::NoIdentity { n_source, n_target }),
+            Self::Identity => GroundTruth::first_vertices(n_source, n_source, n_target),
+            Self::FirstVertices(count) => GroundTruth::first_vertices(*count, n_source, n_target),
+            Self::Map(file) => {
+                let map = read_point_map(file, Some(n_target))?;
+                super::check_size("the ground truth map", map.len(), "the source", n_source)?;
+                GroundTruth::from_map(&map)
+            }
+            Self::Lists(source_file, target_file) => {
+                let source = read_point_map(source_file, Some(n_source))?;
+                let target = read_point_map(target_file, Some(n_target))?;
+                if source.len() != target.len() {
+                    return Err(EvalError::ListMismatch {
+                        source_file: source_file.display().to_string(),
+                        n_source: source.len(),
+                        target_file: target_file.display().to_string(),
+                        n_target: target.len(),
+                    });
+                }
+                let pairs = source.iter().zip(target.iter()).filter_map(|(s, t)| Some((s?, t?)));
+                GroundTruth::new(pairs.collect(), n_source, n_target)
+            }
+        }
+    }
+}
+
+impl GroundTruth {
+    /// Correct matches as (source vertex, target vertex).
+    pub fn new(pairs: Vec<(u32, u32)>, n_source: usize, n_target: usize) -> Result<Self, EvalError> {
+        let what = "the ground truth";
+        for &(source, target) in &pairs {
+            for (side, index, n_vertices) in [("source", source, n_source), ("target", target, n_target)] {
+                if index as usize >= n_vertices {
+                    return Err(EvalError::IndexOutOfRange { what, side, index, n_vertices });
+                }
+            }
+        }
+        Ok(Self { pairs, n_source, n_target })
+    }
+
+    /// Vertex i corresponds with vertex i, for all `n` vertices of both meshes.
+    pub fn identity(n: usize) -> Self {
+        Self { pairs: (0..n as u32).map(|i| (i, i)).collect(), n_source: n, n_target: n }
+    }
+
+    /// The correct matches that a point map states.
+    pub fn from_map(map: &PointMap) -> Result<Self, EvalError> {
+        let pairs = map.iter().enumerate().filter_map(|(s, t)| Some((s as u32, t?)));
+        Self::new(pairs.collect(), map.len(), map.n_target)
+    }
+
+    fn first_vertices(count: usize, n_source: usize, n_target: usize) -> Result<Self, EvalError> {
+        // One beyond the smaller mesh is enough to be told what is wrong.
+        let count = count.min(n_source.min(n_target) + 1) as u32;
+        Self::new((0..count).map(|i| (i, i)).collect(), n_source, n_target)
+    }
+
+    /// The correct matches, (source vertex, target vertex).
+    pub fn pairs(&self) -> &[(u32, u32)] {
+        &self.pairs
+    }
+
+    /// Number of source vertices.
+    pub fn n_source(&self) -> usize {
+        self.n_source
+    }
+
+    /// Number of target vertices.
+    pub fn n_target(&self) -> usize {
+        self.n_target
+    }
+
+    /// As a point map; of several targets of one source vertex it has the last.
+    pub fn to_map(&self) -> PointMap {
+        let mut targets = vec![PointMap::UNMATCHED; self.n_source];
+        for &(source, target) in &self.pairs {
+            targets[source as usize] = target;
+        }
+        PointMap::new(targets, self.n_target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<GroundTruthSource, EvalError> {
+        text.parse()
+    }
+
+    #[test]
+    fn text_says_where_from() {
+        assert_eq!(parse("identity").unwrap(), GroundTruthSource::Identity);
+        assert_eq!(parse("identity:7").unwrap(), GroundTruthSource::FirstVertices(7));
+        assert_eq!(parse("a/map.txt").unwrap(), GroundTruthSource::Map("a/map.txt".into()));
+        assert_eq!(parse("a.vts,b.vts").unwrap(), GroundTruthSource::Lists("a.vts".into(), "b.vts".into()));
+        for bad in ["", "a,", ",b", "a,b,c", "identity:x"] {
+            assert!(matches!(parse(bad), Err(EvalError::BadGroundTruth(_))), "{bad}");
+        }
+    }
+
+    #[test]
+    fn identity_needs_one_size() {
+        assert_eq!(GroundTruthSource::Identity.load(3, 3).unwrap(), GroundTruth::identity(3));
+        assert!(matches!(GroundTruthSource::Identity.load(3, 4), Err(EvalError::NoIdentity { .. })));
+        assert_eq!(GroundTruthSource::FirstVertices(2).load(3, 4).unwrap().pairs(), &[(0, 0), (1, 1)]);
+        assert!(matches!(
+            GroundTruthSource::FirstVertices(4).load(3, 4),
+            Err(EvalError::IndexOutOfRange { side: "source", index: 3, .. })
+        ));
+    }
+
+    #[test]
+    fn lists_and_maps_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).unwrap();
+            folder.path().join(name)
+        };
+        let (a, b) = (file("a.vts", "3\n1\n3\n"), file("b.vts", "1\n2\n2\n"));
+        let lists = GroundTruthSource::Lists(a.clone(), b).load(3, 2).unwrap();
+        assert_eq!(lists.pairs(), &[(2, 0), (0, 1), (2, 1)]);
+        assert_eq!(lists.to_map().targets, [1, PointMap::UNMATCHED, 1]);
+        let short = file("c.vts", "1\n");
+        assert!(matches!(
+            GroundTruthSource::Lists(a, short).load(3, 2),
+            Err(EvalError::ListMismatch { n_source: 3, n_target: 1, .. })
+        ));
+        let map = GroundTruthSource::Map(file("map.txt", "1\n-1\n0\n"));
+        assert_eq!(map.load(3, 2).unwrap().pairs(), &[(0, 1), (2, 0)]);
+        assert!(matches!(map.load(4, 2), Err(EvalError::SizeMismatch { found: 3, expected: 4, .. })));
+    }
+}

@@ -1,0 +1,111 @@
+//! The errors of a map in a few numbers.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::ErrorCurve;
+
+/// The errors of a map, or of several maps taken together, in a few numbers. Errors are lengths over sqrt(area).
+///
+/// Matches without an error (unmatched vertices, NaN) and matches on another component than the right one (infinite)
+/// are left out of [`mean`](Self::mean) and [`worst`](Self::worst), which would say nothing otherwise, but count as
+/// wrong in every share and in the curve: a map cannot gain by leaving hard vertices out unseen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorSummary {
+    /// Number of correct matches known.
+    pub count: usize,
+    /// Mean error; 0 where there is none. The field reports it times 100.
+    pub mean: f64,
+    /// Largest error.
+    pub worst: f64,
+    /// Area under the curve from 0 to 0.10, as a share of the best possible.
+    pub auc: f64,
+    /// Share of matches that are exact.
+    pub exact: f64,
+    /// Share of matches with an error of at most 0.05.
+    pub within_005: f64,
+    /// Share of vertices that were matched at all.
+    pub coverage: f64,
+    /// Number of matches on another component than the right one.
+    pub disconnected: usize,
+}
+
+impl ErrorSummary {
+    /// Sums up normalised `errors` as [`geodesic_errors`](super::geodesic_errors) gives them.
+    pub fn new(errors: &[f32]) -> Self {
+        let finite = || errors.iter().copied().filter(|e| e.is_finite()).map(f64::from);
+        let n_finite = finite().count();
+        let n_unmatched = errors.iter().filter(|e| e.is_nan()).count();
+        let share = |limit: f32| {
+            let within = errors.iter().filter(|&&e| e <= limit).count();
+            within as f64 / errors.len().max(1) as f64
+        };
+        Self {
+            count: errors.len(),
+            mean: finite().sum::<f64>() / n_finite.max(1) as f64,
+            worst: finite().fold(0.0, f64::max),
+            auc: ErrorCurve::princeton(errors).auc(),
+            exact: share(0.0),
+            within_005: share(0.05),
+            coverage: (errors.len() - n_unmatched) as f64 / errors.len().max(1) as f64,
+            disconnected: errors.len() - n_unmatched - n_finite,
+        }
+    }
+
+    /// Average error in the unit of a mesh of this area: centimetres for the FAUST scans.
+    pub fn mean_length(&self, area: f64) -> f64 {
+        self.mean * area.sqrt()
+    }
+
+    /// Worst error in the unit of a mesh of this area.
+    pub fn worst_length(&self, area: f64) -> f64 {
+        self.worst * area.sqrt()
+    }
+}
+
+impl fmt::Display for ErrorSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "mean error x 100: {:.3}, exact {:.2} %, within 0.05 {:.2} %, AUC {:.4}, worst x 100: {:.1}",
+            100.0 * self.mean,
+            100.0 * self.exact,
+            100.0 * self.within_005,
+            self.auc,
+            100.0 * self.worst
+        )?;
+        if self.coverage < 1.0 {
+            write!(f, ", coverage {:.2} %", 100.0 * self.coverage)?;
+        }
+        if self.disconnected > 0 {
+            write!(f, ", {} on another component", self.disconnected)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unmatched_and_disconnected_lower_the_shares_only() {
+        let summary = ErrorSummary::new(&[0.0, 0.02, 0.07, f32::NAN, f32::INFINITY]);
+        assert!((summary.mean - 0.03).abs() < 1e-8 && (summary.worst - 0.07).abs() < 1e-8);
+        assert_eq!((summary.exact, summary.within_005, summary.coverage), (0.2, 0.4, 0.8));
+        assert_eq!((summary.count, summary.disconnected), (5, 1));
+        assert!((summary.mean_length(4.0) - 0.06).abs() < 1e-8);
+        assert!((summary.worst_length(4.0) - 0.14).abs() < 1e-8);
+        let text = summary.to_string();
+        assert!(text.contains("coverage 80.00 %") && text.contains("1 on another component"), "{text}");
+    }
+
+    #[test]
+    fn perfect_map_and_no_map() {
+        let perfect = ErrorSummary::new(&[0.0; 4]);
+        assert_eq!((perfect.mean, perfect.exact, perfect.coverage), (0.0, 1.0, 1.0));
+        assert!((perfect.auc - 1.0).abs() < 1e-12);
+        assert_eq!(ErrorSummary::new(&[]).mean, 0.0);
+    }
+}
