@@ -1,0 +1,135 @@
+//! The whole step on synthetic pairs.
+
+use super::*;
+use crate::network::{NetworkOptions, Normalization};
+use crate::testing::random;
+use candle_core::Device;
+
+const POINTS: usize = 60;
+const K: usize = 8;
+const WIDTH: usize = 16;
+
+/// Cosines on points along a line: a basis that is nearly orthonormal for equal masses.
+fn shape(seed: u64, signal: &[f64]) -> ShapeBatch {
+    let noise = random(seed, POINTS * WIDTH);
+    let shot = signal.iter().zip(noise).map(|(s, n)| (s + 0.3 * n) as f32).collect();
+    let cosine = |i: usize, l: usize| {
+        let position = (i as f64 + 0.5) / POINTS as f64;
+        if l == 0 { 1.0 } else { 2f64.sqrt() * (std::f64::consts::PI * l as f64 * position).cos() }
+    };
+    ShapeBatch {
+        shot: Matrix::from_vec(POINTS, WIDTH, shot),
+        basis: Matrix::from_fn(POINTS, K, |i, l| cosine(i, l) as f32),
+        mass: vec![1.0 / POINTS as f32; POINTS],
+        eigenvalues: (0..K).map(|l| (std::f64::consts::PI * l as f64).powi(2)).collect(),
+        distances: Some(Matrix::from_fn(POINTS, POINTS, |i, j| i.abs_diff(j) as f32 / POINTS as f32)),
+    }
+}
+
+fn pair(seed: u64) -> PairBatch {
+    let signal = random(100 + seed, POINTS * WIDTH);
+    let negatives = (0..POINTS as u32).map(|i| (i, (i + 20) % POINTS as u32)).collect();
+    PairBatch { source: shape(2 * seed, &signal), target: shape(2 * seed + 1, &signal), negatives }
+}
+
+fn runner(options: StepOptions) -> StepRunner {
+    let network = NetworkOptions { blocks: 2, width: WIDTH, ..NetworkOptions::default() };
+    StepRunner::new(Network::new(network, &Device::Cpu).unwrap(), options).unwrap()
+}
+
+fn all_options() -> Vec<StepOptions> {
+    let soft = |norm| LossOptions::SoftError { norm };
+    let with = |functional_map: FmSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
+    vec![
+        with(FmSolver::least_squares(), soft(ColumnNorm::L2)),
+        with(FmSolver::regularized(), soft(ColumnNorm::L2)),
+        with(FmSolver::regularized(), soft(ColumnNorm::L1)),
+        with(FmSolver::regularized(), LossOptions::Siamese { gamma: 0.5, margin: 3.0 }),
+    ]
+}
+
+#[test]
+fn a_pair_is_learned_in_some_dozens_of_steps() {
+    for options in all_options() {
+        let mut runner = runner(options.clone());
+        let pairs = [pair(1)];
+        let first = runner.step(&pairs, 1e-2).unwrap();
+        let last = (0..60).map(|_| runner.step(&pairs, 1e-2).unwrap()).last().unwrap();
+        assert!(last.loss < 0.5 * first.loss, "{options:?}: {first:?} to {last:?}");
+    }
+}
+
+#[test]
+fn gradient_of_the_whole_loss_equals_differences_along_it() {
+    for options in all_options() {
+        let mut runner = runner(options.clone());
+        let pairs = [pair(1)];
+        let values = runner.network.parameter_values().unwrap();
+        let (_, gradient) = runner.gradient(&pairs).unwrap();
+        let gradient: Vec<f32> = gradient.to_vec1().unwrap();
+        let length = gradient.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
+        let mut loss_at = |step: f64| {
+            let moved: Vec<f32> =
+                values.iter().zip(&gradient).map(|(&v, &g)| (f64::from(v) + step / length * f64::from(g)) as f32).collect();
+            runner.network.set_parameter_values(&moved).unwrap();
+            runner.gradient(&pairs).unwrap().0.loss
+        };
+        let step = 3e-3;
+        let slope = (loss_at(step) - loss_at(-step)) / (2.0 * step);
+        assert!((slope - length).abs() < 2e-2 * length, "{options:?}: slope {slope}, gradient {length}");
+    }
+}
+
+#[test]
+fn threads_do_not_change_the_bits() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut runner = runner(StepOptions { clip: Some(1e-3), ..StepOptions::default() });
+            let stats: Vec<_> = (0..3).map(|i| runner.step(&[pair(i), pair(i + 1)], 1e-3).unwrap()).collect();
+            (stats, runner.network.parameter_values().unwrap())
+        })
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn accumulated_gradient_is_the_mean_over_the_pairs() {
+    let mut runner = runner(StepOptions::default());
+    let alone: Vec<Vec<f32>> =
+        [pair(1), pair(2)].map(|pair| runner.gradient(&[pair]).unwrap().1.to_vec1().unwrap()).into();
+    let both: Vec<f32> = runner.gradient(&[pair(1), pair(2)]).unwrap().1.to_vec1().unwrap();
+    for ((a, b), both) in alone[0].iter().zip(&alone[1]).zip(both) {
+        assert!(((a + b) / 2.0 - both).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn running_statistics_and_clipping_train_too() {
+    let network = NetworkOptions {
+        blocks: 2,
+        width: WIDTH,
+        normalization: Normalization::Running,
+        ..NetworkOptions::default()
+    };
+    let options = StepOptions { clip: Some(0.01), ..StepOptions::default() };
+    let mut runner = StepRunner::new(Network::new(network, &Device::Cpu).unwrap(), options).unwrap();
+    let first = runner.step(&[pair(1)], 1e-2).unwrap();
+    let last = (0..40).map(|_| runner.step(&[pair(1)], 1e-2).unwrap()).last().unwrap();
+    assert!(last.loss < 0.7 * first.loss);
+    assert_ne!(runner.network.running_statistics()[0][0].mean, vec![0.0; WIDTH]);
+}
+
+#[test]
+fn a_batch_that_does_not_fit_names_the_part() {
+    let mut runner = runner(StepOptions::default());
+    let mut wrong = pair(1);
+    wrong.target.mass.pop();
+    let error = runner.step(&[pair(1), wrong], 1e-3).unwrap_err().to_string();
+    assert!(error.contains("pair 1") && error.contains("vertex areas of the target"), "{error}");
+    let mut nan = pair(1);
+    nan.source.shot.data_mut().fill(f32::NAN);
+    let before = runner.network.parameter_values().unwrap();
+    assert!(runner.step(&[nan], 1e-3).unwrap_err().to_string().contains("NaN"));
+    assert_eq!(before, runner.network.parameter_values().unwrap());
+}
