@@ -12,6 +12,7 @@ pub mod point_map;
 pub mod refine;
 pub mod render;
 pub mod spectral;
+pub mod synth;
 pub mod upscale;
 
 pub use matrix::Matrix;

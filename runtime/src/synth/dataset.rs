@@ -1,0 +1,175 @@
+//! A folder of bodies with a manifest, for training.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::Mesh;
+
+use super::{Body, Species, SynthError, SynthOptions, Template, UNMATCHED};
+
+/// What a dataset holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DatasetOptions {
+    /// Species, each in a folder of its name; default all.
+    pub species: Vec<Species>,
+    /// Individuals of every species, at least 2; default 40.
+    pub per_species: usize,
+    /// Share of the individuals of a species that are for validation, in [0, 0.9]; default 0.1.
+    pub validation: f64,
+    /// Another seed, other individuals; below 2^32; default 0.
+    pub seed: u32,
+    /// Triangulation and damage.
+    pub body: SynthOptions,
+}
+
+impl Default for DatasetOptions {
+    fn default() -> Self {
+        Self {
+            species: Species::ALL.to_vec(),
+            per_species: 40,
+            validation: 0.1,
+            seed: 0,
+            body: SynthOptions::default(),
+        }
+    }
+}
+
+/// What a shape of a dataset is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// Seen by training.
+    Train,
+    /// Unseen individuals of seen species.
+    Validation,
+    /// Species that training never sees ([`Species::held_out`]).
+    Test,
+}
+
+impl Split {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Validation => "validation",
+            Self::Test => "test",
+        }
+    }
+}
+
+/// The split of the individual with the given number, 0-based: the last ones of a species validate.
+pub fn split_of(species: Species, individual: usize, options: &DatasetOptions) -> Split {
+    let validating = (options.validation * options.per_species as f64).ceil() as usize;
+    if species.held_out() {
+        Split::Test
+    } else if individual + validating >= options.per_species {
+        Split::Validation
+    } else {
+        Split::Train
+    }
+}
+
+/// Writes a dataset into `folder`, which is made if need be: `SPECIES/SPECIES_000.ply` with `SPECIES_000.vts`
+/// (line i: 1-based vertex of landmark i, 0 where it is missing), and `dataset.toml`, which names them:
+///
+/// ```toml
+/// format = 1
+/// [[shape]]
+/// name = "man_000"
+/// mesh = "man/man_000.ply"
+/// group = "man"                         # shapes of one group correspond with each other
+/// correspondence = "man/man_000.vts"
+/// split = "train"                       # train, validation or test
+/// ```
+///
+/// The manifest is written last: a folder that has it is complete. `progress` is told after each shape how many of how
+/// many are done.
+pub fn write_dataset(
+    folder: &Path,
+    options: &DatasetOptions,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<(), SynthError> {
+    options.check()?;
+    let total = options.species.len() * options.per_species;
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let mut manifest = String::from("format = 1\n");
+    for &species in &options.species {
+        let place = folder.join(species.name());
+        fs::create_dir_all(&place).map_err(|source| SynthError::Write { path: place.clone(), source })?;
+        let template = Template::new(species);
+        (0..options.per_species).into_par_iter().try_for_each(|individual| {
+            let seed = (u64::from(options.seed) << 24) + individual as u64;
+            let body = template.body(seed, &options.body)?;
+            let name = name_of(species, individual);
+            write(&place.join(format!("{name}.ply")), &ply(&body.mesh))?;
+            write(&place.join(format!("{name}.vts")), &vts(&body))?;
+            progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
+            Ok(())
+        })?;
+        for individual in 0..options.per_species {
+            let (name, group) = (name_of(species, individual), species.name());
+            let split = split_of(species, individual, options).name();
+            let _ = write!(
+                manifest,
+                "\n[[shape]]\nname = \"{name}\"\nmesh = \"{group}/{name}.ply\"\ngroup = \"{group}\"\n\
+                 correspondence = \"{group}/{name}.vts\"\nsplit = \"{split}\"\n"
+            );
+        }
+    }
+    write(&folder.join("dataset.toml"), manifest.as_bytes())
+}
+
+impl DatasetOptions {
+    fn check(&self) -> Result<(), SynthError> {
+        let refuse = |option, value: String, range| Err(SynthError::Option { option, value, range });
+        if !(2..1 << 24).contains(&self.per_species) {
+            return refuse("per_species", self.per_species.to_string(), "2 to 16777215");
+        }
+        if !(0.0..=0.9).contains(&self.validation) {
+            return refuse("validation", self.validation.to_string(), "0 to 0.9");
+        }
+        self.body.check()
+    }
+}
+
+fn name_of(species: Species, individual: usize) -> String {
+    format!("{}_{individual:03}", species.name())
+}
+
+/// Writes to a temporary name first, so that no half-written file is ever taken for a whole one.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
+    let temporary = path.with_extension("partial");
+    let attempt = || -> std::io::Result<()> {
+        let mut file = fs::File::create(&temporary)?;
+        file.write_all(bytes)?;
+        fs::rename(&temporary, path)
+    };
+    attempt().map_err(|source| SynthError::Write { path: path.to_owned(), source })
+}
+
+fn vts(body: &Body) -> Vec<u8> {
+    let line =
+        |&vertex: &u32| if vertex == UNMATCHED { "0\n".to_owned() } else { format!("{}\n", vertex + 1) };
+    body.landmarks.iter().map(line).collect::<String>().into_bytes()
+}
+
+/// A mesh as binary PLY, coordinates in single precision.
+fn ply(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.n_vertices(),
+        mesh.n_faces()
+    )
+    .into_bytes();
+    for x in mesh.vertices().iter().flatten() {
+        bytes.extend((*x as f32).to_le_bytes());
+    }
+    for face in mesh.faces() {
+        bytes.push(3);
+        face.iter().for_each(|i| bytes.extend(i.to_le_bytes()));
+    }
+    bytes
+}

@@ -1,0 +1,313 @@
+//! Polygons of an implicit surface on a sparse grid by dual marching cubes (Nielson 2004): one vertex per sheet of the
+//! surface in a cell, which keeps the mesh manifold where two sheets pass one cell, and one quadrilateral per crossed
+//! grid edge. The vertices are then put on the surface.
+
+use rayon::prelude::*;
+
+use crate::mesh::vec3;
+
+use super::implicit::{Part, field};
+use super::math::Vec3;
+
+/// Cells along each side of a block of the grid.
+const BLOCK: usize = 8;
+const CORNERS: usize = BLOCK + 1;
+
+/// A closed triangle mesh, and for each vertex the parts of the body that shape its neighbourhood.
+pub(super) struct Surface {
+    pub(super) vertices: Vec<Vec3>,
+    pub(super) faces: Vec<[u32; 3]>,
+    /// Indices into the parts, one list per block of the grid.
+    pub(super) active: Vec<Vec<u16>>,
+    /// For each vertex its list in `active`.
+    pub(super) block_of: Vec<u32>,
+}
+
+struct Grid {
+    origin: Vec3,
+    cell: f64,
+    blocks: [usize; 3],
+}
+
+struct Block {
+    active: Vec<u16>,
+    /// Values at the corners, x fastest; empty where the surface does not pass.
+    values: Vec<f64>,
+    /// First vertex of each cell, counted within the block, or `NONE`.
+    cells: Vec<u32>,
+    /// `(cell, edge, vertex)` for the edges on the further sheets of a cell.
+    sheets: Vec<(u16, u8, u32)>,
+    vertices: Vec<Vec3>,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// The zero set of the smooth union of `parts`, sampled at the grid spacing `cell`; faces look outwards.
+pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
+    let grid = Grid::around(parts, cell);
+    let n_blocks = grid.blocks.iter().product();
+    let blocks: Vec<Block> = (0..n_blocks).into_par_iter().map(|b| grid.sample(parts, b)).collect();
+    let mut first = Vec::with_capacity(n_blocks);
+    let (mut vertices, mut block_of) = (Vec::new(), Vec::new());
+    for (b, block) in blocks.iter().enumerate() {
+        first.push(vertices.len() as u32);
+        vertices.extend_from_slice(&block.vertices);
+        block_of.extend(std::iter::repeat_n(b as u32, block.vertices.len()));
+    }
+    let quads: Vec<Vec<[u32; 4]>> =
+        (0..n_blocks).into_par_iter().map(|b| grid.quads(&blocks, &first, b)).collect();
+    let active = blocks.into_iter().map(|block| block.active).collect();
+    let mut surface = Surface { vertices, faces: Vec::new(), active, block_of };
+    let quads = quads.concat();
+    surface.project(parts, cell, 2);
+    surface.even_out(&quads);
+    surface.project(parts, cell, 3);
+    surface.faces = quads.iter().flat_map(|&quad| split(quad, &surface.vertices)).collect();
+    surface
+}
+
+/// Two triangles of a quadrilateral, cut along the shorter diagonal.
+fn split([a, b, c, d]: [u32; 4], vertices: &[Vec3]) -> [[u32; 3]; 2] {
+    let length = |i: u32, j: u32| vec3::distance(vertices[i as usize], vertices[j as usize]);
+    if length(a, c) <= length(b, d) { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] }
+}
+
+impl Surface {
+    /// Value of the body's field near vertex `i`.
+    fn value(&self, parts: &[Part], i: usize, p: Vec3) -> f64 {
+        field(self.active[self.block_of[i] as usize].iter().map(|&part| &parts[part as usize]), p)
+    }
+
+    /// Newton steps onto the zero set, each at most a cell long.
+    fn project(&mut self, parts: &[Part], cell: f64, steps: usize) {
+        let projected = (0..self.vertices.len()).into_par_iter().map(|i| {
+            let (mut p, delta) = (self.vertices[i], 0.05 * cell);
+            for _ in 0..steps {
+                let value = self.value(parts, i, p);
+                let gradient: Vec3 = std::array::from_fn(|axis| {
+                    let mut q = p;
+                    q[axis] += delta;
+                    (self.value(parts, i, q) - value) / delta
+                });
+                let step = (value / vec3::dot(gradient, gradient).max(0.05)).clamp(-cell, cell);
+                p = vec3::sub(p, vec3::scale(gradient, step.clamp(-0.5 * cell, 0.5 * cell)));
+            }
+            p
+        });
+        self.vertices = projected.collect();
+    }
+
+    /// Moves every vertex half-way to the mean of its neighbours, which evens out the triangles.
+    fn even_out(&mut self, quads: &[[u32; 4]]) {
+        let mut sums = vec![[0.0; 4]; self.vertices.len()];
+        for quad in quads {
+            for corner in 0..4 {
+                let (i, j) = (quad[corner] as usize, quad[(corner + 1) % 4] as usize);
+                for (to, from) in [(i, j), (j, i)] {
+                    let p = self.vertices[from];
+                    for axis in 0..3 {
+                        sums[to][axis] += p[axis];
+                    }
+                    sums[to][3] += 1.0;
+                }
+            }
+        }
+        for (p, sum) in self.vertices.iter_mut().zip(sums) {
+            for axis in 0..3 {
+                p[axis] = 0.5 * (p[axis] + sum[axis] / sum[3]);
+            }
+        }
+    }
+}
+
+impl Grid {
+    fn around(parts: &[Part], cell: f64) -> Self {
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for part in parts.iter().filter(|part| !part.carve) {
+            let (center, radius) = part.solid.bound();
+            for axis in 0..3 {
+                low[axis] = low[axis].min(center[axis] - radius - part.blend);
+                high[axis] = high[axis].max(center[axis] + radius + part.blend);
+            }
+        }
+        let origin = low.map(|x| x - 1.5 * cell);
+        let span = cell * BLOCK as f64;
+        let blocks =
+            std::array::from_fn(|axis| ((high[axis] + 1.5 * cell - origin[axis]) / span).ceil() as usize);
+        Self { origin, cell, blocks }
+    }
+
+    /// Position of the block with index `b` in the grid of blocks.
+    fn place(&self, b: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.blocks;
+        [b % nx, (b / nx) % ny, b / (nx * ny)]
+    }
+
+    /// Evaluates the field in block `b`, unless the surface is far from it, and makes the vertices of its cells.
+    fn sample(&self, parts: &[Part], b: usize) -> Block {
+        let place = self.place(b);
+        let at = |corner: [usize; 3]| -> Vec3 {
+            std::array::from_fn(|i| self.origin[i] + self.cell * (place[i] * BLOCK + corner[i]) as f64)
+        };
+        let half = 0.5 * self.cell * BLOCK as f64;
+        let center = at([0; 3]).map(|x| x + half);
+        let reach = 3f64.sqrt() * half;
+        let mut block = Block {
+            active: self.active(parts, center, reach),
+            values: vec![],
+            cells: vec![],
+            sheets: vec![],
+            vertices: vec![],
+        };
+        let near = || block.active.iter().map(|&part| &parts[part as usize]);
+        if near().all(|part| part.carve) || field(near(), center).abs() > 1.8 * reach {
+            return block;
+        }
+        let values: Vec<f64> = (0..CORNERS.pow(3))
+            .map(|c| field(near(), at([c % CORNERS, (c / CORNERS) % CORNERS, c / CORNERS.pow(2)])))
+            .collect();
+        block.cells = vec![NONE; BLOCK.pow(3)];
+        for c in 0..BLOCK.pow(3) {
+            let cell = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
+            let corner = at(cell);
+            for (sheet, edges) in sheets(&values, cell).into_iter().enumerate() {
+                let vertex = block.vertices.len() as u32;
+                if sheet == 0 {
+                    block.cells[c] = vertex;
+                } else {
+                    block.sheets.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
+                }
+                let offset = mean_crossing(&values, cell, &edges);
+                block.vertices.push(std::array::from_fn(|axis| corner[axis] + self.cell * offset[axis]));
+            }
+        }
+        block.values = values;
+        block
+    }
+
+    /// Parts whose distance at `center` is small enough to matter within `reach` of it.
+    fn active(&self, parts: &[Part], center: Vec3, reach: f64) -> Vec<u16> {
+        let matters = |part: &Part| part.solid.distance(center) < 1.7 * reach + part.blend + 0.5 * self.cell;
+        (0..parts.len()).filter(|&i| matters(&parts[i])).map(|i| i as u16).collect()
+    }
+
+    /// The quadrilaterals around the crossed grid edges that start in block `b`, counter-clockwise from outside.
+    fn quads(&self, blocks: &[Block], first: &[u32], b: usize) -> Vec<[u32; 4]> {
+        let (block, place, mut quads) = (&blocks[b], self.place(b), Vec::new());
+        if block.values.is_empty() {
+            return quads;
+        }
+        let inside = |c: [usize; 3]| block.values[c[0] + CORNERS * (c[1] + CORNERS * c[2])] < 0.0;
+        for c in 0..BLOCK.pow(3) {
+            let corner = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
+            for axis in 0..3 {
+                let mut end = corner;
+                end[axis] += 1;
+                if inside(corner) == inside(end) {
+                    continue;
+                }
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                let around = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
+                    let mut cell: [usize; 3] = std::array::from_fn(|i| place[i] * BLOCK + corner[i]);
+                    cell[u] = cell[u].checked_sub(du)?;
+                    cell[v] = cell[v].checked_sub(dv)?;
+                    self.vertex(blocks, first, cell, (4 * axis + du + 2 * dv) as u8)
+                });
+                if let [Some(p), Some(q), Some(r), Some(s)] = around {
+                    quads.push(if inside(corner) { [p, q, r, s] } else { [s, r, q, p] });
+                }
+            }
+        }
+        quads
+    }
+
+    /// The vertex of `cell` on the sheet that crosses its edge with the index `edge`.
+    fn vertex(&self, blocks: &[Block], first: &[u32], cell: [usize; 3], edge: u8) -> Option<u32> {
+        let [x, y, z] = cell.map(|c| c / BLOCK);
+        let b = x + self.blocks[0] * (y + self.blocks[1] * z);
+        let [i, j, k] = cell.map(|c| c % BLOCK);
+        let c = i + BLOCK * (j + BLOCK * k);
+        let sheet = blocks[b].sheets.iter().find(|&&(cell, other, _)| (cell as usize, other) == (c, edge));
+        let local = sheet.map_or(*blocks[b].cells.get(c)?, |&(_, _, vertex)| vertex);
+        (local != NONE).then(|| first[b] + local)
+    }
+}
+
+/// Value at a corner of a cell, whose bits are its offsets along x, y, z.
+fn corner_value(values: &[f64], [i, j, k]: [usize; 3], corner: usize) -> f64 {
+    values[i + (corner & 1) + CORNERS * (j + ((corner >> 1) & 1) + CORNERS * (k + (corner >> 2)))]
+}
+
+/// The two corners of an edge of a cell. Edge `4 axis + u + 2 v` runs along `axis`, at the offsets `u` and `v` along
+/// the two axes that follow cyclically.
+fn ends(edge: u8) -> [usize; 2] {
+    let (axis, u, v) = (edge as usize / 4, edge as usize & 1, (edge as usize >> 1) & 1);
+    let start = (u << ((axis + 1) % 3)) | (v << ((axis + 2) % 3));
+    [start, start | (1 << axis)]
+}
+
+/// The sheets of the surface in a cell, each as the edges it crosses. Where a face is crossed four times, its inside
+/// corners are taken to be apart, in both cells that share it.
+fn sheets(values: &[f64], cell: [usize; 3]) -> Vec<Vec<u8>> {
+    let inside: [bool; 8] = std::array::from_fn(|corner| corner_value(values, cell, corner) < 0.0);
+    if inside.iter().all(|&x| x) || !inside.iter().any(|&x| x) {
+        return Vec::new();
+    }
+    let crossed = |edge: u8| inside[ends(edge)[0]] != inside[ends(edge)[1]];
+    let mut sheet: [u8; 12] = std::array::from_fn(|edge| edge as u8);
+    for (normal, offset) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+        let on_face = |&edge: &u8| ends(edge).iter().all(|corner| (corner >> normal) & 1 == offset);
+        let edges: Vec<u8> = (0..12).filter(|edge| crossed(*edge)).filter(on_face).collect();
+        for (place, &a) in edges.iter().enumerate() {
+            for &b in &edges[place + 1..] {
+                let shared = ends(a).into_iter().find(|corner| ends(b).contains(corner));
+                if edges.len() == 2 || shared.is_some_and(|corner| inside[corner]) {
+                    let (from, to) = (sheet[a as usize], sheet[b as usize]);
+                    sheet.iter_mut().filter(|s| **s == from).for_each(|s| *s = to);
+                }
+            }
+        }
+    }
+    let mut result: Vec<(u8, Vec<u8>)> = Vec::new();
+    for edge in (0..12).filter(|&edge| crossed(edge)) {
+        let label = sheet[edge as usize];
+        match result.iter_mut().find(|(known, _)| *known == label) {
+            Some((_, edges)) => edges.push(edge),
+            None => result.push((label, vec![edge])),
+        }
+    }
+    result.into_iter().map(|(_, edges)| edges).collect()
+}
+
+/// Mean of the points where the surface crosses the given edges of a cell, in units of the cell.
+fn mean_crossing(values: &[f64], cell: [usize; 3], edges: &[u8]) -> Vec3 {
+    let mut sum = [0.0; 3];
+    for &edge in edges {
+        let [start, end] = ends(edge);
+        let (low, high) = (corner_value(values, cell, start), corner_value(values, cell, end));
+        for (axis, coordinate) in sum.iter_mut().enumerate() {
+            *coordinate +=
+                if axis == edge as usize / 4 { low / (low - high) } else { ((start >> axis) & 1) as f64 };
+        }
+    }
+    sum.map(|x| x / edges.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::implicit::Solid;
+    use super::*;
+
+    #[test]
+    fn ball_has_the_area_of_a_ball_and_looks_outwards() {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let solid = Solid::Ellipsoid { center: [0.3, 0.1, 0.2], radii: [1.0; 3], axes };
+        let ball = polygonize(&[Part { solid, blend: 0.1, carve: false, bones: vec![0] }], 0.05);
+        let mesh = crate::Mesh::new(ball.vertices, ball.faces).unwrap();
+        assert_eq!(mesh.n_faces(), 2 * mesh.n_vertices() - 4);
+        let volume: f64 =
+            (0..mesh.n_faces()).map(|f| vec3::dot(mesh.corners(f)[0], mesh.face_cross(f)) / 6.0).sum();
+        assert!((mesh.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "area {}", mesh.area());
+        assert!((volume / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 4e-3, "volume {volume}");
+    }
+}
