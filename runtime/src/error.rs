@@ -5,6 +5,7 @@ use crate::fmap::FmapError;
 use crate::io::IoError;
 use crate::mesh::{DecimateError, MeshError, RepairError};
 use crate::network::NetworkError;
+use crate::point_map::RecoverError;
 use crate::refine::RefineError;
 use crate::spectral::EigenError;
 use crate::upscale::UpscaleError;
@@ -37,6 +38,9 @@ pub enum Error {
     /// The functional map cannot be computed.
     #[error(transparent)]
     Fmap(#[from] FmapError),
+    /// The point map cannot be recovered.
+    #[error(transparent)]
+    Recover(#[from] RecoverError),
     /// The map cannot be refined.
     #[error(transparent)]
     Refine(#[from] RefineError),

@@ -232,7 +232,7 @@ impl Matcher {
                 functional_map_info.rank, self.k
             )));
         }
-        let raw = timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target));
+        let raw = timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
         let map = self.refine(&source.shape, &target.shape, &functional_map, raw, &pair, observer)?;
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
@@ -259,7 +259,7 @@ impl Matcher {
             }
             Refinement::Zoomout => {
                 let refined = timed(observer, pair, "zoomout", || {
-                    zoomout(&raw, source.mesh(), target.mesh(), &source.basis, &target.basis, &ZoomOutOptions::default())
+                    zoomout(&raw, &source.basis, &target.basis, &ZoomOutOptions::default())
                 })?;
                 Ok(refined.map)
             }
@@ -290,7 +290,7 @@ impl Matcher {
             }
             Upscaling::LeastSquares => least_squares_functional_map(&phi, &psi).map(|c| (c, None)),
         })?;
-        let map = timed(observer, pair, "full point map", || recover(&full_map, &full_source, &full_target));
+        let map = timed(observer, pair, "full point map", || recover(&full_map, &full_source, &full_target))?;
         Ok((map, info))
     }
 

@@ -12,6 +12,7 @@ mod soft;
 
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use adjoint::functional_map_of;
@@ -22,7 +23,8 @@ pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
 pub(crate) use dense::{multiply, thin_svd};
 
 /// How a functional map is computed from descriptors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum FmapSolver {
     /// The paper's: all coefficients by least squares, [`least_squares`].
     LeastSquares,

@@ -3,8 +3,24 @@
 use std::fs::{self, Permissions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::IoError;
+use tempfile::NamedTempFile;
+
+/// Temporary files of writes under way, so that an interrupted program can remove them.
+static UNDER_WAY: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes the temporary files of all writes under way: for a program that is about to end by an interrupt.
+pub fn remove_temporary_files() {
+    for path in lock().iter() {
+        let _ = fs::remove_file(path);
+    }
+}
+
+fn lock() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Writes a file under a temporary name in the same folder and renames it when it is complete, so that no
 /// reader ever sees half a file and an old one survives a failure.
@@ -44,7 +60,20 @@ fn write_and_rename(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     if let Some(permissions) = permissions(path) {
         builder.permissions(permissions);
     }
-    let mut file = BufWriter::with_capacity(1 << 17, builder.tempfile_in(folder)?);
+    let file = builder.tempfile_in(folder)?;
+    let temporary = file.path().to_path_buf();
+    lock().push(temporary.clone());
+    let written = write_and_persist(file, path, write);
+    lock().retain(|p| *p != temporary);
+    written
+}
+
+fn write_and_persist(
+    file: NamedTempFile,
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut file = BufWriter::with_capacity(1 << 17, file);
     write(&mut file)?;
     file.into_inner().map_err(io::IntoInnerError::into_error)?.persist(path)?;
     Ok(())

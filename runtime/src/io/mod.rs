@@ -39,7 +39,7 @@ mod hostile;
 
 use std::path::Path;
 
-pub use atomic::write_atomically;
+pub use atomic::{remove_temporary_files, write_atomically};
 pub use attributes::{Attributes, Joint, MeshFile, ReadInfo, Skin, Texture};
 pub use error::{IoError, Position};
 pub use format::MeshFormat;

@@ -4,7 +4,7 @@
 //! way round each target vertex takes from the source vertex whose match is nearest on the target.
 
 use crate::io::{Attributes, Skin};
-use crate::mesh::{Adjacency, vec3};
+use crate::mesh::{Topology, vec3};
 use crate::point_map::PointMap;
 use crate::{Matrix, Mesh};
 use std::cmp::Reverse;
@@ -33,12 +33,12 @@ impl Donors {
                 queue.push(Reverse((Ordered(0.0), vertex)));
             }
         }
-        let adjacency = Adjacency::new(target);
+        let adjacency = Topology::new(target).adjacency();
         while let Some(Reverse((Ordered(d), v))) = queue.pop() {
             if d > distance[v as usize] {
                 continue;
             }
-            for &w in adjacency.neighbors(v) {
+            for &w in adjacency.of(v as usize) {
                 let edge = vec3::distance(target.vertices()[v as usize], target.vertices()[w as usize]);
                 if d + edge < distance[w as usize] {
                     distance[w as usize] = d + edge;

@@ -19,7 +19,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
     let observer = |event| console.event(event);
     let start = Instant::now();
     let DemoPair { source, target, ground_truth } =
-        timed(&observer, "demo", "build two bodies", || demo_pair(Species::DEMO, 0));
+        timed(&observer, "demo", "build two bodies", || demo_pair(Species::Man, 0));
     let matcher = Matcher::new(&MatchOptions::default())?;
     let match_start = Instant::now();
     let (described_source, described_target) = rayon::join(
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
     let summary = timed(&observer, "demo", "evaluate", || -> Result<_> {
         let solver = GeodesicSolver::new(&target.mesh, &GeodesicOptions::default());
         let area = target.mesh.area();
-        Ok(ErrorSummary::new(&geodesic_errors(&result.map, &truth, &solver, area)?, area))
+        Ok(ErrorSummary::new(&geodesic_errors(&result.map, &truth, &solver, area)?))
     })?;
     let text = format!(
         "Two bodies that the model never saw, of {} and {} vertices, matched in {match_seconds:.2} s.\n{summary}\nViewer: {}",
