@@ -5,7 +5,7 @@ use super::Topology;
 impl Topology<'_> {
     /// The boundary loops as vertices in order, each begun at its lowest half-edge and in that one's direction.
     ///
-    /// A loop passes each vertex along one fan, so two holes that touch in a vertex are two loops. Where it meets a
+    /// A loop follows the rim of the faces: two holes that touch in a vertex are one loop that passes it twice. At a
     /// non-manifold edge a loop ends, and what lies on the other side is a loop of its own.
     pub fn boundary_loops(&self) -> Vec<Vec<u32>> {
         let mut seen = vec![false; self.edges.len()];

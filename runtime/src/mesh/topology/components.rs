@@ -15,28 +15,34 @@ pub struct Components {
 impl Topology<'_> {
     /// The connected components of the vertices.
     pub fn components(&self) -> Components {
-        let mut sets = UnionFind::new(self.n_vertices);
-        let mut of_vertex = vec![NONE; self.n_vertices];
-        for &[i, j] in &self.edges {
-            sets.union(i, j);
-            // Any label but NONE: the vertex has a face.
-            of_vertex[i as usize] = 0;
-            of_vertex[j as usize] = 0;
-        }
-        let mut count = 0;
-        for vertex in 0..self.n_vertices as u32 {
-            if of_vertex[vertex as usize] == NONE {
-                continue;
-            }
-            // The root is the lowest vertex of its set, so it is labelled before the others ask for its label.
-            let root = sets.find(vertex);
-            of_vertex[vertex as usize] = if root == vertex {
-                count += 1;
-                count - 1
-            } else {
-                of_vertex[root as usize]
-            };
-        }
-        Components { of_vertex, count: count as usize }
+        let proper = |f: &usize| self.edge_of_half_edge[3 * f] != NONE;
+        components((0..self.faces.len()).filter(proper).map(|f| self.faces[f]), self.n_vertices)
     }
+}
+
+/// The connected components of the vertices, below `n_vertices`, of some faces.
+pub(in crate::mesh) fn components(faces: impl Iterator<Item = [u32; 3]>, n_vertices: usize) -> Components {
+    let mut sets = UnionFind::new(n_vertices);
+    let mut of_vertex = vec![NONE; n_vertices];
+    for [i, j, k] in faces {
+        sets.union(i, j);
+        sets.union(i, k);
+        // Any label but NONE: the vertex has a face.
+        [i, j, k].iter().for_each(|&v| of_vertex[v as usize] = 0);
+    }
+    let mut count = 0;
+    for vertex in 0..n_vertices as u32 {
+        if of_vertex[vertex as usize] == NONE {
+            continue;
+        }
+        // The root is the lowest vertex of its set, so it is labelled before the others ask for its label.
+        let root = sets.find(vertex);
+        of_vertex[vertex as usize] = if root == vertex {
+            count += 1;
+            count - 1
+        } else {
+            of_vertex[root as usize]
+        };
+    }
+    Components { of_vertex, count: count as usize }
 }

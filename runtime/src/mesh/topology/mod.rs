@@ -9,6 +9,7 @@ mod components;
 mod fans;
 
 pub use components::Components;
+pub(super) use components::components;
 pub use fans::Fans;
 
 use super::Mesh;
