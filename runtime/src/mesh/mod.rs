@@ -1,12 +1,22 @@
 //! Triangle meshes: the type, what can be wrong with one, its repair and its reduction.
 
+mod decimate;
 mod geometry;
+mod repair;
+mod sampling;
 pub mod shapes;
+#[cfg(test)]
+mod test_data;
 mod topology;
 mod union_find;
+mod validate;
 pub mod vec3;
 
+pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
+pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
+pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
 pub use topology::{Adjacency, Components, Fans, NONE, Topology};
+pub use validate::{ComponentSize, Found, MeshReport, inspect};
 
 use thiserror::Error;
 
