@@ -56,7 +56,8 @@ pub fn symmetric_geodesic_errors(
 ) -> Result<SymmetricErrors, EvalError> {
     let direct = geodesic_errors(map, ground_truth, solver, area)?;
     let flipped = geodesic_errors(map, mirrored, solver, area)?;
-    let is_mirrored = ErrorSummary::new(&flipped).mean < ErrorSummary::new(&direct).mean;
+    let mean = |errors: &[f32]| ErrorSummary::new(errors, area).mean;
+    let is_mirrored = mean(&flipped) < mean(&direct);
     Ok(SymmetricErrors { errors: if is_mirrored { flipped } else { direct }, is_mirrored })
 }
 

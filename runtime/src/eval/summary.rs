@@ -19,6 +19,10 @@ pub struct ErrorSummary {
     pub mean: f64,
     /// Largest error.
     pub worst: f64,
+    /// Mean error in the unit of the target mesh: centimetres for the FAUST scans.
+    pub mean_length: f64,
+    /// Largest error in the unit of the target mesh.
+    pub worst_length: f64,
     /// Area under the curve from 0 to 0.10, as a share of the best possible.
     pub auc: f64,
     /// Share of matches that are exact.
@@ -32,8 +36,9 @@ pub struct ErrorSummary {
 }
 
 impl ErrorSummary {
-    /// Sums up normalised `errors` as [`geodesic_errors`](super::geodesic_errors) gives them.
-    pub fn new(errors: &[f32]) -> Self {
+    /// Sums up normalised `errors` as [`geodesic_errors`](super::geodesic_errors) gives them, on a target mesh of the
+    /// given area (of several maps taken together, the mean area).
+    pub fn new(errors: &[f32], area: f64) -> Self {
         let finite = || errors.iter().copied().filter(|e| e.is_finite()).map(f64::from);
         let n_finite = finite().count();
         let n_unmatched = errors.iter().filter(|e| e.is_nan()).count();
@@ -41,26 +46,20 @@ impl ErrorSummary {
             let within = errors.iter().filter(|&&e| e <= limit).count();
             within as f64 / errors.len().max(1) as f64
         };
+        let mean = finite().sum::<f64>() / n_finite.max(1) as f64;
+        let worst = finite().fold(0.0, f64::max);
         Self {
             count: errors.len(),
-            mean: finite().sum::<f64>() / n_finite.max(1) as f64,
-            worst: finite().fold(0.0, f64::max),
+            mean,
+            worst,
+            mean_length: mean * area.sqrt(),
+            worst_length: worst * area.sqrt(),
             auc: ErrorCurve::princeton(errors).auc(),
             exact: share(0.0),
             within_005: share(0.05),
             coverage: (errors.len() - n_unmatched) as f64 / errors.len().max(1) as f64,
             disconnected: errors.len() - n_unmatched - n_finite,
         }
-    }
-
-    /// Average error in the unit of a mesh of this area: centimetres for the FAUST scans.
-    pub fn mean_length(&self, area: f64) -> f64 {
-        self.mean * area.sqrt()
-    }
-
-    /// Worst error in the unit of a mesh of this area.
-    pub fn worst_length(&self, area: f64) -> f64 {
-        self.worst * area.sqrt()
     }
 }
 
@@ -91,21 +90,21 @@ mod tests {
 
     #[test]
     fn unmatched_and_disconnected_lower_the_shares_only() {
-        let summary = ErrorSummary::new(&[0.0, 0.02, 0.07, f32::NAN, f32::INFINITY]);
+        let summary = ErrorSummary::new(&[0.0, 0.02, 0.07, f32::NAN, f32::INFINITY], 4.0);
         assert!((summary.mean - 0.03).abs() < 1e-8 && (summary.worst - 0.07).abs() < 1e-8);
         assert_eq!((summary.exact, summary.within_005, summary.coverage), (0.2, 0.4, 0.8));
         assert_eq!((summary.count, summary.disconnected), (5, 1));
-        assert!((summary.mean_length(4.0) - 0.06).abs() < 1e-8);
-        assert!((summary.worst_length(4.0) - 0.14).abs() < 1e-8);
+        assert!((summary.mean_length - 0.06).abs() < 1e-8);
+        assert!((summary.worst_length - 0.14).abs() < 1e-8);
         let text = summary.to_string();
         assert!(text.contains("coverage 80.00 %") && text.contains("1 on another component"), "{text}");
     }
 
     #[test]
     fn perfect_map_and_no_map() {
-        let perfect = ErrorSummary::new(&[0.0; 4]);
+        let perfect = ErrorSummary::new(&[0.0; 4], 1.0);
         assert_eq!((perfect.mean, perfect.exact, perfect.coverage), (0.0, 1.0, 1.0));
         assert!((perfect.auc - 1.0).abs() < 1e-12);
-        assert_eq!(ErrorSummary::new(&[]).mean, 0.0);
+        assert_eq!(ErrorSummary::new(&[], 1.0).mean, 0.0);
     }
 }
