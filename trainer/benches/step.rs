@@ -1,6 +1,7 @@
 //! Seconds of a training step (TARGETS.md): one pair, 7 blocks of width 352, k = 120, on 1 and 2 threads.
 //!
-//! `cargo bench -p fmnet-trainer --bench step`; the numbers are the least and the median of several steps.
+//! `cargo bench -p fmnet-trainer --bench step`; prints the least and the median seconds of several steps and, on Linux, the
+//! least CPU seconds, which tell more on a busy machine.
 
 use candle_core::Device;
 use fmnet::Matrix;
@@ -26,28 +27,44 @@ fn shape(points: usize, generator: &mut ChaCha8Rng, both_directions: bool) -> Sh
     }
 }
 
+/// CPU seconds of all threads so far; 0 where the system does not say.
+fn cpu_seconds() -> f64 {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
+    let nanoseconds = |task: std::fs::DirEntry| -> Option<f64> {
+        std::fs::read_to_string(task.path().join("schedstat")).ok()?.split(' ').next()?.parse().ok()
+    };
+    tasks.flatten().filter_map(nanoseconds).sum::<f64>() * 1e-9
+}
+
 fn run(name: &str, points: usize, solver: FmSolver, both_directions: bool, threads: usize) {
     let mut generator = ChaCha8Rng::seed_from_u64(1);
     let source = shape(points, &mut generator, both_directions);
     let target = shape(points, &mut generator, true);
     let pairs = [PairBatch { source, target, negatives: Vec::new() }];
-    let network = Network::new(NetworkOptions::default(), &Device::Cpu).expect("the default network is valid");
+    let network =
+        Network::new(NetworkOptions::default(), &Device::Cpu).expect("the default network is valid");
     let options = StepOptions { functional_map: solver, ..StepOptions::default() };
     let mut runner = StepRunner::new(network, options).expect("the optimiser fits its network");
     let mut step = || {
-        let start = Instant::now();
+        let (start, cpu) = (Instant::now(), cpu_seconds());
         runner.step(&pairs, 1e-3).expect("a step on random data succeeds");
-        start.elapsed().as_secs_f64()
+        (start.elapsed().as_secs_f64(), cpu_seconds() - cpu)
     };
     step();
-    let mut seconds: Vec<f64> = (0..STEPS).map(|_| step()).collect();
+    let (mut seconds, cpu): (Vec<f64>, Vec<f64>) = (0..STEPS).map(|_| step()).unzip();
     seconds.sort_by(f64::total_cmp);
-    println!("{name}, {points} points, {threads} threads: {:.3} s (median {:.3} s)", seconds[0], seconds[STEPS / 2]);
+    let cpu = cpu.into_iter().fold(f64::INFINITY, f64::min);
+    println!(
+        "{name}, {points} points, {threads} threads: {:.3} s, median {:.3} s, CPU {cpu:.3} s",
+        seconds[0],
+        seconds[STEPS / 2]
+    );
 }
 
 fn main() {
     for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+        let pool =
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| {
             run("least squares", 1500, FmSolver::least_squares(), false, threads);
             run("regularised", 1000, FmSolver::regularized(), false, threads);

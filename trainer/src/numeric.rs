@@ -85,11 +85,11 @@ pub(crate) fn vectorized<R>(kernel: impl FnOnce() -> R) -> R {
 }
 
 /// Splits the rows of a row-major `[n, width]` slice at the given lengths, which add up to `n`.
-pub(crate) fn split_rows<'a, T>(
-    mut data: &'a mut [T],
+pub(crate) fn split_rows<T>(
+    mut data: &mut [T],
     width: usize,
     lengths: impl Iterator<Item = usize>,
-) -> Vec<&'a mut [T]> {
+) -> Vec<&mut [T]> {
     let parts = lengths
         .map(|rows| {
             let (head, tail) = std::mem::take(&mut data).split_at_mut(rows * width);

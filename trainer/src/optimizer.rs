@@ -92,7 +92,8 @@ impl Adam {
         self.first = ((&self.first * beta1)? + (gradient * (1.0 - beta1))?)?;
         self.second = ((&self.second * beta2)? + (gradient.sqr()? * (1.0 - beta2))?)?;
         let root = ((&self.second / correction2)?.sqrt()? + epsilon)?;
-        let moved = (variable.as_detached_tensor() - ((&self.first * (learning_rate / correction1))? / root)?)?;
+        let moved =
+            (variable.as_detached_tensor() - ((&self.first * (learning_rate / correction1))? / root)?)?;
         variable.set(&moved)
     }
 }

@@ -23,7 +23,8 @@ impl<T: Real> WeightedBasis<T> {
     pub(crate) fn new(basis: &[f32], mass: &[f32]) -> Self {
         let (points, k) = (mass.len(), basis.len() / mass.len().max(1));
         let rows = basis.chunks(k.max(1)).zip(mass);
-        let data = rows.flat_map(|(row, &mass)| row.iter().map(move |&value| T::from_f64((value * mass).into())));
+        let data =
+            rows.flat_map(|(row, &mass)| row.iter().map(move |&value| T::from_f64((value * mass).into())));
         Self { points, k, data: data.collect() }
     }
 
@@ -41,6 +42,11 @@ pub(crate) fn project<T: Real>(descriptors: &Tensor, bases: [WeightedBasis<T>; 2
     if descriptors.device().is_cpu() {
         return descriptors.contiguous()?.apply_op1(Projection { bases, q });
     }
+    composed(descriptors, bases)
+}
+
+/// The same from Candle's own ops, for devices other than the CPU.
+fn composed<T: Real>(descriptors: &Tensor, bases: [WeightedBasis<T>; 2]) -> Result<Tensor> {
     let mut start = 0;
     let mut parts = Vec::with_capacity(2);
     for basis in bases {
@@ -86,5 +92,38 @@ impl<T: Real> CustomOp1 for Projection<T> {
             Ok(())
         })?;
         Ok(Some(Tensor::from_vec(out, descriptors.shape(), descriptors.device())?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check_gradient, random};
+    use candle_core::Device;
+
+    #[test]
+    fn projection_equals_its_definition_and_its_gradient_the_central_differences() {
+        let (points, k, q) = ([7, 6], [3, 2], 4);
+        let values = |seed, len| random(seed, len).iter().map(|&value| value as f32).collect::<Vec<_>>();
+        let basis = [values(1, points[0] * k[0]), values(2, points[1] * k[1])];
+        let mass = [values(3, points[0]), values(4, points[1])];
+        let weighted = || [0, 1].map(|shape| WeightedBasis::<f64>::new(&basis[shape], &mass[shape]));
+        let rows = random(5, (points[0] + points[1]) * q);
+        let descriptors = Tensor::from_slice(&rows, (points[0] + points[1], q), &Device::Cpu).unwrap();
+
+        let mut expected = Vec::new();
+        for (shape, first) in [(0, 0), (1, points[0])] {
+            let entry = |l: usize, c: usize| {
+                let weight = |i: usize| f64::from(basis[shape][i * k[shape] + l] * mass[shape][i]);
+                (0..points[shape]).map(|i| weight(i) * rows[(first + i) * q + c]).sum::<f64>()
+            };
+            expected
+                .extend((0..k[shape]).flat_map(|l| (0..q).map(move |c| (l, c))).map(|(l, c)| entry(l, c)));
+        }
+        for projected in [project(&descriptors, weighted()), composed(&descriptors, weighted())] {
+            let projected: Vec<f64> = projected.unwrap().flatten_all().unwrap().to_vec1().unwrap();
+            assert!(projected.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-13));
+        }
+        check_gradient(&descriptors, |x| project(x, weighted())?.sqr()?.sum_all(), 1e-8);
     }
 }

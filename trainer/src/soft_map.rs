@@ -121,7 +121,12 @@ impl<T: Real> SoftErrorOp<T> {
             .collect();
         let mut gradient = vec![T::zero(); k_target * k_source];
         let basis_source = MatrixView::new(&self.input.basis_source, m_source, k_source);
-        matmul_split(&mut gradient, MatrixView::new(&coefficients, m_source, k_target).t(), basis_source, PIECES);
+        matmul_split(
+            &mut gradient,
+            MatrixView::new(&coefficients, m_source, k_target).t(),
+            basis_source,
+            PIECES,
+        );
         let (soft, hard) = sums.iter().fold((0.0, 0.0), |total, sum| (total.0 + sum.0, total.1 + sum.1));
         Outcome {
             loss: soft / (2 * m_source * m_target) as f64,

@@ -170,7 +170,8 @@ impl StepRunner {
             LossOptions::SoftError { norm } => self.soft_error(&descriptors, pair, norm),
             LossOptions::Siamese { gamma, margin } => {
                 let points = pair.source.shot.rows();
-                let (source, target) = (descriptors.narrow(0, 0, points)?, descriptors.narrow(0, points, points)?);
+                let (source, target) =
+                    (descriptors.narrow(0, 0, points)?, descriptors.narrow(0, points, points)?);
                 let loss = siamese(&source, &target, &pair.negatives, gamma, margin)?;
                 Ok(PairLoss { loss, hard_error: f64::NAN, condition: 1.0 })
             }
@@ -205,7 +206,9 @@ impl StepRunner {
             };
             let error = soft_error(&solved.map, input)?;
             total = Some(match total {
-                None => PairLoss { loss: error.loss, hard_error: error.hard_error, condition: solved.condition },
+                None => {
+                    PairLoss { loss: error.loss, hard_error: error.hard_error, condition: solved.condition }
+                }
                 Some(other) => PairLoss {
                     loss: ((other.loss + error.loss)? * 0.5)?,
                     hard_error: 0.5 * (other.hard_error + error.hard_error),
@@ -226,7 +229,8 @@ fn take_gradient(gradients: &GradStore, network: &Network) -> Result<Tensor, can
 fn norm(gradient: &Tensor) -> Result<f64, candle_core::Error> {
     if gradient.device().is_cpu() {
         return crate::device::with_slice(gradient, |data: &[f32]| {
-            let part = |chunk: &[f32]| chunk.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>();
+            let part =
+                |chunk: &[f32]| chunk.iter().map(|&value| f64::from(value) * f64::from(value)).sum::<f64>();
             Ok(data.chunks(1024).map(part).sum::<f64>().sqrt())
         });
     }
@@ -238,7 +242,11 @@ fn check(pair: &PairBatch, width: usize, loss: &LossOptions) -> Result<(), Strin
     let points = pair.source.shot.rows();
     for (name, shape) in [("source", &pair.source), ("target", &pair.target)] {
         let expect = |what: &str, found: (usize, usize), expected: (usize, usize)| {
-            if found == expected { Ok(()) } else { Err(format!("{what} of the {name} {found:?}, expected {expected:?}")) }
+            if found == expected {
+                Ok(())
+            } else {
+                Err(format!("{what} of the {name} {found:?}, expected {expected:?}"))
+            }
         };
         let (rows, k) = (shape.shot.rows(), shape.eigenvalues.len());
         expect("descriptors", (rows, shape.shot.cols()), (points.max(1), width))?;

@@ -28,6 +28,9 @@ pub(crate) fn check_gradient(x: &Tensor, loss: impl Fn(&Tensor) -> Result<Tensor
     let largest = numeric.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     assert!(largest > 0.0, "the loss does not depend on the input");
     for (i, (a, b)) in gradient.iter().zip(&numeric).enumerate() {
-        assert!((a - b).abs() <= tolerance * largest, "entry {i}: {a:e} by the backward pass, {b:e} by differences");
+        assert!(
+            (a - b).abs() <= tolerance * largest,
+            "entry {i}: {a:e} by the backward pass, {b:e} by differences"
+        );
     }
 }

@@ -8,8 +8,8 @@
 
 use super::least_squares::{Factor, factor_guarded, multiply};
 use super::{FmLayerError, FmSolver, regularized};
-use faer::linalg::evd;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd;
 use faer::{Mat, MatRef, Par};
 use rayon::prelude::*;
 
@@ -110,7 +110,8 @@ fn condition_number(system: &Mat<f64>) -> Result<f64, FmLayerError> {
         return Err(FmLayerError::NotFinite);
     }
     let mut values = faer::Col::zeros(k);
-    let scratch = evd::self_adjoint_evd_scratch::<f64>(k, evd::ComputeEigenvectors::No, Par::Seq, Default::default());
+    let scratch =
+        evd::self_adjoint_evd_scratch::<f64>(k, evd::ComputeEigenvectors::No, Par::Seq, Default::default());
     let mut memory = MemBuffer::new(scratch);
     evd::self_adjoint_evd(
         system.as_ref(),

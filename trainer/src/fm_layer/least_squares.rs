@@ -1,8 +1,8 @@
 //! `C = G F^T (F F^T + ridge)^-1` and its adjoint.
 
 use super::FmLayerError;
-use faer::linalg::cholesky::llt;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
 use faer::{Mat, MatMut, MatRef, Par, Side};
 
 /// A symmetric positive (semi-)definite `[k, k]` system, ready to be solved.
@@ -16,7 +16,8 @@ pub(super) enum Factor {
 impl Factor {
     /// Factors `system` by Cholesky's method, or says that it is not positive definite.
     pub(super) fn cholesky(mut system: Mat<f64>) -> Option<Self> {
-        let scratch = llt::factor::cholesky_in_place_scratch::<f64>(system.nrows(), Par::Seq, Default::default());
+        let scratch =
+            llt::factor::cholesky_in_place_scratch::<f64>(system.nrows(), Par::Seq, Default::default());
         let mut memory = MemBuffer::new(scratch);
         let stack = MemStack::new(&mut memory);
         llt::factor::cholesky_in_place(
@@ -36,9 +37,8 @@ impl Factor {
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
         let k = system.nrows();
         let threshold = values[k - 1] / max_condition;
-        let scaled = Mat::from_fn(k, k, |i, j| {
-            if values[j] > threshold { vectors[(i, j)] / values[j] } else { 0.0 }
-        });
+        let scaled =
+            Mat::from_fn(k, k, |i, j| if values[j] > threshold { vectors[(i, j)] / values[j] } else { 0.0 });
         let mut inverse = Mat::zeros(k, k);
         multiply(inverse.as_mut(), scaled.as_ref(), vectors.transpose());
         Some(Self::PseudoInverse(inverse))
@@ -81,10 +81,9 @@ pub(super) fn factor_guarded(
         system[(i, i)] += shift;
     }
     // The ridge bounds the condition number by about k / ridge.
-    if condition <= max_condition || ridge * max_condition > k as f64 {
-        if let Some(factor) = Factor::cholesky(system.clone()) {
-            return Ok(factor);
-        }
+    let well_conditioned = condition <= max_condition || ridge * max_condition > k as f64;
+    if well_conditioned && let Some(factor) = Factor::cholesky(system.clone()) {
+        return Ok(factor);
     }
     Factor::pseudo_inverse(system.as_ref(), max_condition).ok_or(FmLayerError::NotFinite)
 }

@@ -6,7 +6,8 @@
 ///
 /// It does not depend on the scale of the shapes as long as both have the same area.
 pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) -> Vec<f64> {
-    let largest = eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(f64::MIN_POSITIVE, f64::max);
+    let largest =
+        eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(f64::MIN_POSITIVE, f64::max);
     let resolvent = |&value: &f64| {
         let squared = (value / largest).max(0.0);
         (squared.sqrt() / (squared + 1.0), 1.0 / (squared + 1.0))

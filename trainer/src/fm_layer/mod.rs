@@ -73,7 +73,9 @@ impl Default for FmSolver {
 #[derive(Debug, Error)]
 pub enum FmLayerError {
     /// The descriptors are not finite.
-    #[error("the spectral descriptors hold NaN or infinite values; lower the learning rate or check the inputs")]
+    #[error(
+        "the spectral descriptors hold NaN or infinite values; lower the learning rate or check the inputs"
+    )]
     NotFinite,
     /// A regularised system cannot be factored.
     #[error(
@@ -87,7 +89,9 @@ pub enum FmLayerError {
         condition: f64,
     },
     /// The descriptors vanish.
-    #[error("the spectral descriptors of the source are all zero, so that no functional map can be solved for")]
+    #[error(
+        "the spectral descriptors of the source are all zero, so that no functional map can be solved for"
+    )]
     Zero,
 }
 

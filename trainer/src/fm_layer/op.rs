@@ -4,7 +4,9 @@ use super::gradient::Solution;
 use super::{FmLayerError, FmSolver};
 use crate::device::contiguous;
 use candle_core::backend::{BackendDevice, BackendStorage};
-use candle_core::{CpuStorage, CudaStorage, CustomOp2, DType, Device, Error, Layout, Result, Shape, Tensor, bail};
+use candle_core::{
+    CpuStorage, CudaStorage, CustomOp2, DType, Device, Error, Layout, Result, Shape, Tensor, bail,
+};
 use faer::{Mat, MatRef};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,7 +21,12 @@ pub struct FunctionalMap {
 /// Solves for the functional map of the spectral descriptors `source` `[k_source, q]` and `target` `[k_target, q]`, both f32
 /// or both f64. `mask` is the [`resolvent_mask`](super::resolvent_mask) `[k_target, k_source]`; the least squares ignore
 /// it. On a GPU the small systems are copied to the host and solved there.
-pub fn functional_map(source: &Tensor, target: &Tensor, solver: &FmSolver, mask: &[f64]) -> Result<FunctionalMap> {
+pub fn functional_map(
+    source: &Tensor,
+    target: &Tensor,
+    solver: &FmSolver,
+    mask: &[f64],
+) -> Result<FunctionalMap> {
     let ((k_source, q), (k_target, q_target)) = (source.dims2()?, target.dims2()?);
     if q != q_target || k_source == 0 || k_target == 0 {
         bail!("spectral descriptors [{k_source}, {q}] of the source, [{k_target}, {q_target}] of the target");
@@ -123,8 +130,7 @@ impl CustomOp2 for FunctionalMapOp {
         let Some(solution) = solution.as_ref() else {
             bail!("the functional map's backward pass comes after its forward pass");
         };
-        let (grad_source, grad_target) =
-            solution.backward(MatRef::from_row_major_slice(&grad, rows, cols));
+        let (grad_source, grad_target) = solution.backward(MatRef::from_row_major_slice(&grad, rows, cols));
         Ok((Some(to_tensor(&grad_source, source)?), Some(to_tensor(&grad_target, target)?)))
     }
 }

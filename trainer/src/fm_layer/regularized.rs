@@ -6,7 +6,11 @@ use faer::Mat;
 use rayon::prelude::*;
 
 /// Factors the systems of all rows; `mask` is `weight d D` `[k_target, k_source]`, row-major.
-pub(super) fn factor_rows(system: &Mat<f64>, mask: &[f64], condition: f64) -> Result<Vec<Factor>, FmLayerError> {
+pub(super) fn factor_rows(
+    system: &Mat<f64>,
+    mask: &[f64],
+    condition: f64,
+) -> Result<Vec<Factor>, FmLayerError> {
     let k = system.nrows();
     mask.par_chunks(k)
         .enumerate()

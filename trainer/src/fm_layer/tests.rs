@@ -55,7 +55,8 @@ fn every_row_satisfies_its_normal_equations() {
 
 #[test]
 fn gradients_of_both_solvers_equal_central_differences() {
-    let weights = Tensor::from_vec(random(6, K_TARGET * K_SOURCE), (K_TARGET, K_SOURCE), &Device::Cpu).unwrap();
+    let weights =
+        Tensor::from_vec(random(6, K_TARGET * K_SOURCE), (K_TARGET, K_SOURCE), &Device::Cpu).unwrap();
     let (f, g) = (descriptors(1, K_SOURCE), descriptors(2, K_TARGET));
     for solver in solvers() {
         let loss = |f: &Tensor, g: &Tensor| {
@@ -102,7 +103,8 @@ fn singular_systems_give_the_shortest_solution() {
 
 #[test]
 fn regularised_solve_copes_with_singular_descriptors() {
-    let solved = functional_map(&deficient(), &descriptors(2, K_TARGET), &FmSolver::regularized(), &mask()).unwrap();
+    let solved =
+        functional_map(&deficient(), &descriptors(2, K_TARGET), &FmSolver::regularized(), &mask()).unwrap();
     assert!(rows(&solved.map).iter().flatten().all(|value| value.is_finite()));
 }
 
@@ -111,7 +113,8 @@ fn useless_descriptors_are_an_error_that_says_so() {
     let zeros = descriptors(1, K_SOURCE).zeros_like().unwrap();
     let nan = (descriptors(1, K_SOURCE) * f64::NAN).unwrap();
     let g = descriptors(2, K_TARGET);
-    let message = |f: &Tensor| functional_map(f, &g, &FmSolver::least_squares(), &[]).err().unwrap().to_string();
+    let message =
+        |f: &Tensor| functional_map(f, &g, &FmSolver::least_squares(), &[]).err().unwrap().to_string();
     assert!(message(&zeros).contains("all zero"), "{}", message(&zeros));
     assert!(message(&nan).contains("NaN"), "{}", message(&nan));
     assert!(functional_map(&g, &g, &FmSolver::regularized(), &[0.0; 3]).is_err());

@@ -82,12 +82,7 @@ impl<T: Real> FusedNetwork<T> {
 
     fn forward(&self, flat: &[T]) -> Result<Vec<T>> {
         if flat.len() != self.blocks * BlockParameters::<T>::len(self.width) {
-            bail!(
-                "{} parameters for {} residual blocks of width {}",
-                flat.len(),
-                self.blocks,
-                self.width
-            );
+            bail!("{} parameters for {} residual blocks of width {}", flat.len(), self.blocks, self.width);
         }
         let plan = self.plan();
         let context = self.context(&plan);
@@ -95,7 +90,9 @@ impl<T: Real> FusedNetwork<T> {
         for block in 0..self.blocks {
             let fixed = match &self.statistics {
                 Statistics::Groups(_) => None,
-                Statistics::Fixed { blocks, .. } => Some(blocks[block].each_ref().map(BatchMoments::to_moments)),
+                Statistics::Fixed { blocks, .. } => {
+                    Some(blocks[block].each_ref().map(BatchMoments::to_moments))
+                }
             };
             let input = saved.last().map_or(&self.input, |previous| &previous.out);
             let parameters = BlockParameters::new(self.block(flat, block), self.width);
@@ -106,7 +103,8 @@ impl<T: Real> FusedNetwork<T> {
             saved.push(activations);
         }
         let out = saved.last().map_or_else(|| self.input.clone(), |last| last.out.clone());
-        let previous = std::mem::replace(&mut *self.saved.lock().unwrap_or_else(PoisonError::into_inner), saved);
+        let previous =
+            std::mem::replace(&mut *self.saved.lock().unwrap_or_else(PoisonError::into_inner), saved);
         previous.into_iter().for_each(|block| block.recycle(&self.pool));
         Ok(out)
     }

@@ -209,9 +209,14 @@ impl Network {
 
     /// Replaces the running statistics.
     pub fn set_running_statistics(&mut self, statistics: Vec<[BatchMoments; 2]>) -> Result<()> {
-        let fits = |m: &BatchMoments| m.mean.len() == self.options.width && m.variance.len() == self.options.width;
+        let fits =
+            |m: &BatchMoments| m.mean.len() == self.options.width && m.variance.len() == self.options.width;
         if statistics.len() != self.options.blocks || !statistics.iter().flatten().all(fits) {
-            bail!("running statistics do not fit {} blocks of width {}", self.options.blocks, self.options.width);
+            bail!(
+                "running statistics do not fit {} blocks of width {}",
+                self.options.blocks,
+                self.options.width
+            );
         }
         self.running = statistics;
         Ok(())

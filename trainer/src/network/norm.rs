@@ -8,7 +8,7 @@ use super::Activation;
 use crate::numeric::{Real, vectorized};
 
 /// Rows of a chunk: at width 352 in single precision, 352 KiB.
-const CHUNK_ROWS: usize = 256;
+const CHUNK_ROWS: usize = 384;
 
 /// How the rows are grouped for statistics and cut for the threads.
 #[derive(Clone, Debug)]
@@ -148,35 +148,44 @@ impl<T: Real> Normalizer<T> {
     #[inline(always)]
     fn apply(&self, affine: Affine<T>, act: Activation, values: &mut [T], out: &mut [T], skip: Option<&[T]>) {
         vectorized(|| match (act, skip) {
-            (Activation::Elu, None) => self.rows(affine, values, out, out_is_skip_free, elu),
-            (Activation::Relu, None) => self.rows(affine, values, out, out_is_skip_free, relu),
-            (Activation::Elu, Some(skip)) => {
-                out.copy_from_slice(skip);
-                self.rows(affine, values, out, out_holds_skip, elu);
-            }
-            (Activation::Relu, Some(skip)) => {
-                out.copy_from_slice(skip);
-                self.rows(affine, values, out, out_holds_skip, relu);
-            }
+            (Activation::Elu, None) => self.rows(affine, values, out, elu),
+            (Activation::Relu, None) => self.rows(affine, values, out, relu),
+            (Activation::Elu, Some(skip)) => self.residual_rows(affine, values, skip, out, elu),
+            (Activation::Relu, Some(skip)) => self.residual_rows(affine, values, skip, out, relu),
         });
     }
 
     #[inline(always)]
-    fn rows(
-        &self,
-        affine: Affine<T>,
-        values: &mut [T],
-        out: &mut [T],
-        skip: impl Fn(T) -> T,
-        activate: impl Fn(T) -> T,
-    ) {
+    fn rows(&self, affine: Affine<T>, values: &mut [T], out: &mut [T], activate: impl Fn(T) -> T) {
         let width = self.mean.len();
         let (mean, inv_std) = (&self.mean[..width], &self.inv_std[..width]);
         let (scale, shift) = (&affine.scale[..width], &affine.shift[..width]);
         for (values, out) in values.chunks_exact_mut(width).zip(out.chunks_exact_mut(width)) {
             for c in 0..width {
                 values[c] = (values[c] - mean[c]) * inv_std[c];
-                out[c] = activate(skip(out[c]) + (values[c] * scale[c] + shift[c]));
+                out[c] = activate(values[c] * scale[c] + shift[c]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn residual_rows(
+        &self,
+        affine: Affine<T>,
+        values: &mut [T],
+        skip: &[T],
+        out: &mut [T],
+        activate: impl Fn(T) -> T,
+    ) {
+        let width = self.mean.len();
+        let (mean, inv_std) = (&self.mean[..width], &self.inv_std[..width]);
+        let (scale, shift) = (&affine.scale[..width], &affine.shift[..width]);
+        let rows =
+            values.chunks_exact_mut(width).zip(skip.chunks_exact(width)).zip(out.chunks_exact_mut(width));
+        for ((values, skip), out) in rows {
+            for c in 0..width {
+                values[c] = (values[c] - mean[c]) * inv_std[c];
+                out[c] = activate(skip[c] + (values[c] * scale[c] + shift[c]));
             }
         }
     }
@@ -189,16 +198,6 @@ pub(super) struct Affine<'a, T> {
     pub(super) scale: &'a [T],
     /// One summand a channel.
     pub(super) shift: &'a [T],
-}
-
-#[inline(always)]
-fn out_is_skip_free<T: Real>(_: T) -> T {
-    T::zero()
-}
-
-#[inline(always)]
-fn out_holds_skip<T: Real>(skip: T) -> T {
-    skip
 }
 
 #[inline(always)]
@@ -282,7 +281,8 @@ fn sum_rows<T: Real>(
 ) {
     let width = shift.len();
     let scale = &mut scale[..width];
-    let rows = grad.chunks_exact_mut(width).zip(output.chunks_exact(width)).zip(normalized.chunks_exact(width));
+    let rows =
+        grad.chunks_exact_mut(width).zip(output.chunks_exact(width)).zip(normalized.chunks_exact(width));
     for ((grad, output), normalized) in rows {
         for c in 0..width {
             grad[c] *= derivative(output[c]);
@@ -315,7 +315,8 @@ impl<T: Real> NormBackward<T> {
     pub(super) fn apply(&self, grad: &[T], normalized: &[T], out: &mut [T]) {
         let width = self.mean.len();
         let (factor, mean, slope) = (&self.factor[..width], &self.mean[..width], &self.slope[..width]);
-        let rows = grad.chunks_exact(width).zip(normalized.chunks_exact(width)).zip(out.chunks_exact_mut(width));
+        let rows =
+            grad.chunks_exact(width).zip(normalized.chunks_exact(width)).zip(out.chunks_exact_mut(width));
         vectorized(|| {
             for ((grad, normalized), out) in rows {
                 for c in 0..width {

@@ -3,9 +3,7 @@
 //! `[n, width]` row-major, weights `[width in, width out]`. Each stage goes over the chunks of a [`RowPlan`] once, so
 //! that a chunk's product, sums and elementwise work happen while it is in the cache.
 
-use super::norm::{
-    Affine, GradientSums, Moments, NormBackward, Normalizer, RowPlan, activation_backward,
-};
+use super::norm::{Affine, GradientSums, Moments, NormBackward, Normalizer, RowPlan, activation_backward};
 use super::{Activation, pool::BufferPool};
 use crate::numeric::{MatrixView, Real, matmul, matmul_split, split_rows};
 use rayon::prelude::*;
@@ -184,8 +182,7 @@ impl<T: Real> BlockContext<'_, T> {
                 let norm = &norm2[self.plan.chunks[chunk].0];
                 norm.apply(self.chunk(grad, chunk), self.chunk(normalized2, chunk), grad_product);
                 matmul(grad_hidden, false, self.view(grad_product), parameters.weight(1).t());
-                let (hidden, normalized) =
-                    (self.chunk(&saved.hidden, chunk), self.chunk(normalized1, chunk));
+                let (hidden, normalized) = (self.chunk(&saved.hidden, chunk), self.chunk(normalized1, chunk));
                 activation_backward(self.activation, grad_hidden, hidden, normalized, self.width)
             })
             .collect();

@@ -1,6 +1,9 @@
 //! The fused network against a plain implementation, its gradient against central differences.
 
 use super::*;
+use crate::fm_layer::{FmSolver, functional_map, resolvent_mask};
+use crate::projection::{WeightedBasis, project};
+use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
 use crate::testing::{check_gradient, random};
 
 fn options(normalization: Normalization, activation: Activation) -> NetworkOptions {
@@ -39,7 +42,8 @@ fn naive(options: &NetworkOptions, flat: &[f64], input: &[f64], groups: &[usize]
         let mut y = x.clone();
         for (half, part) in block.chunks(block.len() / 2).enumerate() {
             let (weight, affine) = part.split_at(width * width);
-            let product = |i: usize, c: usize| (0..width).map(|l| y[i * width + l] * weight[l * width + c]).sum();
+            let product =
+                |i: usize, c: usize| (0..width).map(|l| y[i * width + l] * weight[l * width + c]).sum();
             let mut z: Vec<f64> = (0..y.len()).map(|at| product(at / width, at % width)).collect();
             let mut start = 0;
             for &rows in groups {
@@ -117,8 +121,9 @@ fn gradients_of_all_parameter_families_equal_central_differences() {
             let flat = parameters(&options);
             let flat = Tensor::from_slice(&flat, flat.len(), &Device::Cpu).unwrap();
             let loss = |out: Tensor| (out.sqr()? * &weights)?.sum_all();
-            let by_op =
-                |x: &Tensor| loss(x.apply_op1(fused(&options, &input, Statistics::Groups(groups.clone())))?);
+            let by_op = |x: &Tensor| {
+                loss(x.apply_op1(fused(&options, &input, Statistics::Groups(groups.clone())))?)
+            };
             check_gradient(&flat, by_op, 1e-7);
             check_gradient(
                 &flat,
@@ -130,10 +135,50 @@ fn gradients_of_all_parameter_families_equal_central_differences() {
 }
 
 #[test]
+fn gradient_of_the_whole_loss_equals_central_differences() {
+    let (points, k) = (20, 4);
+    let input = Tensor::from_vec(random(7, 2 * points * 5), (2 * points, 5), &Device::Cpu).unwrap();
+    let basis = |seed| random(seed, points * k).iter().map(|&value| value as f32).collect::<Vec<_>>();
+    let bases = || [21, 22].map(|seed| WeightedBasis::<f64>::new(&basis(seed), &vec![1.0; points]));
+    let wide = |seed| basis(seed).iter().map(|&value| f64::from(value)).collect::<Vec<_>>();
+    let eigenvalues: Vec<f64> = (0..k).map(|l| 12.0 * l as f64).collect();
+    let mask = resolvent_mask(&eigenvalues, &eigenvalues);
+    let distances: Vec<f64> = random(23, points * points).iter().map(|value| value.abs()).collect();
+    let flat = parameters(&options(Normalization::PerShape, Activation::Elu));
+    let flat = Tensor::from_slice(&flat, flat.len(), &Device::Cpu).unwrap();
+    for normalization in [Normalization::PerShape, Normalization::Running] {
+        let options = options(normalization, Activation::Elu);
+        let groups =
+            if normalization == Normalization::PerShape { vec![points; 2] } else { vec![2 * points] };
+        for (solver, norm) in [
+            (FmSolver::least_squares(), ColumnNorm::L2),
+            (FmSolver::regularized(), ColumnNorm::L2),
+            (FmSolver::regularized(), ColumnNorm::L1),
+        ] {
+            let loss = |x: &Tensor| {
+                let out = x.apply_op1(fused(&options, &input, Statistics::Groups(groups.clone())))?;
+                let spectral = project(&out, bases())?;
+                let (source, target) = (spectral.narrow(0, 0, k)?, spectral.narrow(0, k, k)?);
+                let solved = functional_map(&source, &target, &solver, &mask)?;
+                let error = SoftErrorInput {
+                    basis_source: wide(21),
+                    basis_target: wide(22),
+                    distances: distances.clone(),
+                    norm,
+                };
+                Ok(soft_error(&solved.map, error)?.loss)
+            };
+            check_gradient(&flat, loss, 1e-5);
+        }
+    }
+}
+
+#[test]
 fn running_statistics_converge_to_those_of_a_repeated_batch() {
     let options = NetworkOptions { momentum: 0.5, ..options(Normalization::Running, Activation::Elu) };
     let mut network = Network::new(options, &Device::Cpu).unwrap();
-    let shape = Tensor::from_vec(random(5, 300), (60, 5), &Device::Cpu).unwrap().to_dtype(DType::F32).unwrap();
+    let shape =
+        Tensor::from_vec(random(5, 300), (60, 5), &Device::Cpu).unwrap().to_dtype(DType::F32).unwrap();
     let shapes = [shape.narrow(0, 0, 40).unwrap(), shape.narrow(0, 40, 20).unwrap()];
     let mut trained = network.forward_train(&shapes).unwrap();
     for _ in 0..40 {

@@ -37,6 +37,7 @@ impl<'a, T> MatrixView<'a, T> {
 
     /// Rows `start..end`, without a copy.
     fn rows(self, start: usize, end: usize) -> Self {
+        assert!(start <= end && end <= self.rows, "rows {start}..{end} of {}", self.rows);
         let first = (start * self.row_stride).min(self.data.len());
         Self { data: &self.data[first..], rows: end - start, ..self }
     }

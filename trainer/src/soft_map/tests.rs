@@ -26,7 +26,9 @@ fn naive(map: &[f64], input: &SoftErrorInput<f64>) -> (f64, f64) {
     for j in 0..m_source {
         let entry = |i: usize| -> f64 {
             let term = |t: usize, s: usize| {
-                input.basis_target[i * k_target + t] * map[t * k_source + s] * input.basis_source[j * k_source + s]
+                input.basis_target[i * k_target + t]
+                    * map[t * k_source + s]
+                    * input.basis_source[j * k_source + s]
             };
             (0..k_target).map(|t| (0..k_source).map(|s| term(t, s)).sum::<f64>()).sum::<f64>().abs()
         };
@@ -54,8 +56,8 @@ fn soft_error_equals_its_definition_and_its_gradient_the_central_differences() {
             assert!((error.loss.to_scalar::<f64>().unwrap() - loss).abs() < 1e-14);
             assert!((error.hard_error - hard).abs() < 1e-14);
         }
-        check_gradient(&map(), |x| Ok((soft_error(x, input(norm))?.loss * 3.0)?), 1e-8);
-        check_gradient(&map(), |x| Ok((composed(x, input(norm), sizes)?.loss * 3.0)?), 1e-8);
+        check_gradient(&map(), |x| soft_error(x, input(norm))?.loss * 3.0, 1e-8);
+        check_gradient(&map(), |x| composed(x, input(norm), sizes)?.loss * 3.0, 1e-8);
     }
 }
 

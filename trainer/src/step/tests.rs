@@ -39,7 +39,8 @@ fn runner(options: StepOptions) -> StepRunner {
 
 fn all_options() -> Vec<StepOptions> {
     let soft = |norm| LossOptions::SoftError { norm };
-    let with = |functional_map: FmSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
+    let with =
+        |functional_map: FmSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
     vec![
         with(FmSolver::least_squares(), soft(ColumnNorm::L2)),
         with(FmSolver::regularized(), soft(ColumnNorm::L2)),
@@ -69,8 +70,11 @@ fn gradient_of_the_whole_loss_equals_differences_along_it() {
         let gradient: Vec<f32> = gradient.to_vec1().unwrap();
         let length = gradient.iter().map(|&g| f64::from(g).powi(2)).sum::<f64>().sqrt();
         let mut loss_at = |step: f64| {
-            let moved: Vec<f32> =
-                values.iter().zip(&gradient).map(|(&v, &g)| (f64::from(v) + step / length * f64::from(g)) as f32).collect();
+            let moved: Vec<f32> = values
+                .iter()
+                .zip(&gradient)
+                .map(|(&v, &g)| (f64::from(v) + step / length * f64::from(g)) as f32)
+                .collect();
             runner.network.set_parameter_values(&moved).unwrap();
             runner.gradient(&pairs).unwrap().0.loss
         };
