@@ -2,6 +2,7 @@
 
 mod decimate;
 mod geometry;
+mod nearest;
 mod repair;
 mod sampling;
 pub mod shapes;
@@ -13,6 +14,7 @@ mod validate;
 pub mod vec3;
 
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
+pub use nearest::{nearest_k_vertices, nearest_vertices};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
 pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
 pub use topology::{Adjacency, Components, Fans, NONE, Topology};

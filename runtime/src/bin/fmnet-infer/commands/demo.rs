@@ -32,7 +32,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
     let summary = timed(&observer, "demo", "evaluate", || -> Result<_> {
         let solver = GeodesicSolver::new(&target.mesh, &GeodesicOptions::default());
         let area = target.mesh.area();
-        Ok(ErrorSummary::new(&geodesic_errors(&result.map, &truth, &solver, area)?))
+        Ok(ErrorSummary::new(&geodesic_errors(&result.map, &truth, &solver, area)?, area))
     })?;
     let text = format!(
         "Two bodies that the model never saw, of {} and {} vertices, matched in {match_seconds:.2} s.\n{summary}\nViewer: {}",

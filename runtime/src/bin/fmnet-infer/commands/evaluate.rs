@@ -64,7 +64,7 @@ fn evaluate(
             (found.errors, found.is_mirrored)
         }
     };
-    let (curve, summary) = (ErrorCurve::princeton(&errors), ErrorSummary::new(&errors));
+    let (curve, summary) = (ErrorCurve::princeton(&errors), ErrorSummary::new(&errors, area));
     Ok(Evaluated { name: file_name(path), curve, summary, mirrored })
 }
 
