@@ -79,7 +79,7 @@ impl<'a> Validation<'a> {
         let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
         let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
         let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
-        let map = recover(&map, &basis_source, &basis_target);
+        let map = recover(&map, &basis_source, &basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))
             .filter(|&(&a, &b)| a != MISSING && b != MISSING)
             .map(|(&a, &b)| (a, b))

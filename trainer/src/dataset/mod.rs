@@ -162,7 +162,7 @@ impl ShapeEntry {
 }
 
 fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
-    let map = read_point_map(path)?;
+    let map = read_point_map(path, None)?;
     let points: Vec<u32> = (0..map.len()).map(|i| map.get(i).unwrap_or(MISSING)).collect();
     match points.iter().position(|&v| v != MISSING && v as usize >= n) {
         None => Ok(points),

@@ -46,7 +46,7 @@ pub fn to_onnx(network: &Network, metadata: &ModelMetadata) -> Result<Vec<u8>, E
     let mut graph = GraphBuilder::new(WIDTH, options.activation, options.epsilon as f32);
     let mut x = INPUT.to_string();
     for block in 0..options.blocks {
-        let mut half = |graph: &mut GraphBuilder, input: &str, half: usize| {
+        let half = |graph: &mut GraphBuilder, input: &str, half: usize| {
             let part = |name: &str| parameters.get(&format!("blocks.{block}.{name}"));
             let weight = part(&format!("linear{half}.weight"));
             let (scale, shift) = (part(&format!("norm{half}.scale")), part(&format!("norm{half}.shift")));

@@ -229,7 +229,6 @@ pub(crate) enum RefineArg {
     None,
     Icp,
     Zoomout,
-    Pmf,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -285,7 +284,6 @@ impl PipelineArgs {
                 RefineArg::None => Refinement::None,
                 RefineArg::Icp => Refinement::Icp,
                 RefineArg::Zoomout => Refinement::Zoomout,
-                RefineArg::Pmf => Refinement::ProductManifold,
             }),
             upscaling: match self.upscale {
                 UpscaleArg::L21 => Upscaling::L21,

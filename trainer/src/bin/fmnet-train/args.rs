@@ -55,7 +55,7 @@ pub(crate) struct SynthArgs {
     pub(crate) count: u32,
     /// Seed: the same seed gives the same dataset
     #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    pub(crate) seed: u32,
     /// Least number of vertices of a body, 1000 to 20000
     #[arg(long, default_value_t = 5000)]
     pub(crate) min_vertices: usize,
