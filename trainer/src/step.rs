@@ -1,6 +1,6 @@
 //! One training step: network, projection, functional map, loss, gradient, Adam.
 
-use crate::fm_layer::{FmSolver, functional_map, resolvent_mask};
+use crate::fm_layer::{FmSolver, functional_map};
 use crate::loss::{LossOptions, siamese};
 use crate::network::Network;
 use crate::optimizer::{Adam, AdamOptions};
@@ -8,6 +8,7 @@ use crate::projection::{WeightedBasis, project};
 use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
 use candle_core::{DType, Tensor, backprop::GradStore};
 use fmnet::Matrix;
+use fmnet::fmap::resolvent_mask;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

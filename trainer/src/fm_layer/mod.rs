@@ -6,17 +6,15 @@
 //!
 //! - [`FmSolver::LeastSquares`]: `C = G F^T (S + ridge)^-1 = G F^+`, the paper's.
 //! - [`FmSolver::Regularized`]: row `i` of `C` solves `(S + weight d diag(D_i)) c_i = F g_i`, where `D` is a mask that
-//!   grows with the distance of the eigenvalues ([`resolvent_mask`]) and `d` the mean diagonal of `S`.
+//!   grows with the distance of the eigenvalues ([`fmnet::fmap::resolvent_mask`]) and `d` the mean diagonal of `S`.
 //!
 //! Everything is solved in double precision, whatever the type of the tensors.
 
 mod gradient;
 mod least_squares;
-mod mask;
 mod op;
 mod regularized;
 
-pub use mask::resolvent_mask;
 pub use op::{FunctionalMap, functional_map};
 
 use serde::{Deserialize, Serialize};

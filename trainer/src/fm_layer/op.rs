@@ -8,6 +8,7 @@ use candle_core::{
     CpuStorage, CudaStorage, CustomOp2, DType, Device, Error, Layout, Result, Shape, Tensor, bail,
 };
 use faer::{Mat, MatRef};
+use fmnet::Matrix;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A functional map and how well it was determined.
@@ -19,26 +20,26 @@ pub struct FunctionalMap {
 }
 
 /// Solves for the functional map of the spectral descriptors `source` `[k_source, q]` and `target` `[k_target, q]`, both f32
-/// or both f64. `mask` is the [`resolvent_mask`](super::resolvent_mask) `[k_target, k_source]`; the least squares ignore
+/// or both f64. `mask` is [`fmnet::fmap::resolvent_mask`], `[k_target, k_source]`; the least squares ignore
 /// it. On a GPU the small systems are copied to the host and solved there.
 pub fn functional_map(
     source: &Tensor,
     target: &Tensor,
     solver: &FmSolver,
-    mask: &[f64],
+    mask: &Matrix,
 ) -> Result<FunctionalMap> {
     let ((k_source, q), (k_target, q_target)) = (source.dims2()?, target.dims2()?);
     if q != q_target || k_source == 0 || k_target == 0 {
         bail!("spectral descriptors [{k_source}, {q}] of the source, [{k_target}, {q_target}] of the target");
     }
     let regularized = matches!(solver, FmSolver::Regularized { .. });
-    if regularized && mask.len() != k_source * k_target {
-        bail!("the mask has {} entries for a functional map [{k_target}, {k_source}]", mask.len());
+    if regularized && (mask.rows(), mask.cols()) != (k_target, k_source) {
+        bail!("a mask [{}, {}] for a functional map [{k_target}, {k_source}]", mask.rows(), mask.cols());
     }
     let solution = Arc::new(Mutex::new(None));
     let op = FunctionalMapOp {
         solver: solver.clone(),
-        mask: if regularized { mask.to_vec() } else { Vec::new() },
+        mask: if regularized { mask.data().to_vec() } else { Vec::new() },
         solution: solution.clone(),
     };
     let map = source.contiguous()?.apply_op2(&target.contiguous()?, op)?;

@@ -3,6 +3,8 @@
 use super::*;
 use crate::testing::{check_gradient, random};
 use candle_core::{DType, Device, Tensor};
+use fmnet::Matrix;
+use fmnet::fmap::{LeastSquaresOptions, least_squares, regularized, resolvent_mask};
 
 const K_SOURCE: usize = 5;
 const K_TARGET: usize = 4;
@@ -12,9 +14,15 @@ fn descriptors(seed: u64, k: usize) -> Tensor {
     Tensor::from_vec(random(seed, k * Q), (k, Q), &Device::Cpu).unwrap()
 }
 
-fn mask() -> Vec<f64> {
-    let eigenvalues = |scale: f64, k: usize| (0..k).map(|i| scale * i as f64).collect::<Vec<_>>();
-    resolvent_mask(&eigenvalues(12.0, K_SOURCE), &eigenvalues(13.5, K_TARGET))
+/// Of the source and of the target.
+fn eigenvalues() -> (Vec<f64>, Vec<f64>) {
+    let spectrum = |scale: f64, k: usize| (0..k).map(|i| scale * i as f64).collect();
+    (spectrum(12.0, K_SOURCE), spectrum(13.5, K_TARGET))
+}
+
+fn mask() -> Matrix {
+    let (source, target) = eigenvalues();
+    resolvent_mask(&source, &target)
 }
 
 fn solvers() -> [FmSolver; 4] {
@@ -42,7 +50,7 @@ fn every_row_satisfies_its_normal_equations() {
             for j in 0..K_SOURCE {
                 let diagonal = match solver {
                     FmSolver::LeastSquares { ridge, .. } => ridge * mean,
-                    FmSolver::Regularized { weight } => weight * mean * mask()[i * K_SOURCE + j],
+                    FmSolver::Regularized { weight } => weight * mean * mask()[(i, j)],
                 };
                 let system = |l: usize| dot(&rows_f[j], &rows_f[l]);
                 let left = (0..K_SOURCE).map(|l| system(l) * map[i][l]).sum::<f64>() + diagonal * map[i][j];
@@ -50,6 +58,21 @@ fn every_row_satisfies_its_normal_equations() {
                 assert!((left - right).abs() < 1e-12, "{solver:?} row {i}, column {j}: {left} vs {right}");
             }
         }
+    }
+}
+
+#[test]
+fn maps_equal_those_of_the_runtime() {
+    let (f, g) = (descriptors(1, K_SOURCE), descriptors(2, K_TARGET));
+    let matrix = |t: &Tensor, k| Matrix::from_vec(k, Q, t.flatten_all().unwrap().to_vec1().unwrap());
+    let (f_hat, g_hat) = (matrix(&f, K_SOURCE), matrix(&g, K_TARGET));
+    let (source, target) = eigenvalues();
+    let plain = least_squares(&f_hat, &g_hat, &LeastSquaresOptions::default()).unwrap().0;
+    let masked = regularized(&f_hat, &g_hat, &source, &target, 0.1).unwrap().0;
+    for (solver, expected) in [(FmSolver::least_squares(), plain), (FmSolver::regularized(), masked)] {
+        let map = rows(&functional_map(&f, &g, &solver, &mask()).unwrap().map);
+        let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-11;
+        assert!(map.iter().flatten().zip(expected.data()).all(close), "{solver:?}");
     }
 }
 
@@ -90,13 +113,13 @@ fn deficient() -> Tensor {
 #[test]
 fn singular_systems_give_the_shortest_solution() {
     let (f, g) = (deficient(), descriptors(2, K_TARGET));
-    let solved = functional_map(&f, &g, &FmSolver::least_squares(), &[]).unwrap();
+    let solved = functional_map(&f, &g, &FmSolver::least_squares(), &Matrix::default()).unwrap();
     assert!(solved.condition > 1e12);
     let map = solved.map;
     // C = G F^+ has its rows in the range of F, and C F is the projection of G: (C F - G) F^T = 0.
     let residual = (map.matmul(&f).unwrap() - g).unwrap().matmul(&f.t().unwrap()).unwrap();
     assert!(rows(&residual).iter().flatten().all(|value| value.abs() < 1e-9));
-    let range = functional_map(&f, &f, &FmSolver::least_squares(), &[]).unwrap().map;
+    let range = functional_map(&f, &f, &FmSolver::least_squares(), &Matrix::default()).unwrap().map;
     let projected = (map.matmul(&range).unwrap() - map).unwrap();
     assert!(rows(&projected).iter().flatten().all(|value| value.abs() < 1e-9));
 }
@@ -113,9 +136,10 @@ fn useless_descriptors_are_an_error_that_says_so() {
     let zeros = descriptors(1, K_SOURCE).zeros_like().unwrap();
     let nan = (descriptors(1, K_SOURCE) * f64::NAN).unwrap();
     let g = descriptors(2, K_TARGET);
-    let message =
-        |f: &Tensor| functional_map(f, &g, &FmSolver::least_squares(), &[]).err().unwrap().to_string();
+    let message = |f: &Tensor| {
+        functional_map(f, &g, &FmSolver::least_squares(), &Matrix::default()).err().unwrap().to_string()
+    };
     assert!(message(&zeros).contains("all zero"), "{}", message(&zeros));
     assert!(message(&nan).contains("NaN"), "{}", message(&nan));
-    assert!(functional_map(&g, &g, &FmSolver::regularized(), &[0.0; 3]).is_err());
+    assert!(functional_map(&g, &g, &FmSolver::regularized(), &Matrix::default()).is_err());
 }

@@ -1,10 +1,11 @@
 //! The fused network against a plain implementation, its gradient against central differences.
 
 use super::*;
-use crate::fm_layer::{FmSolver, functional_map, resolvent_mask};
+use crate::fm_layer::{FmSolver, functional_map};
 use crate::projection::{WeightedBasis, project};
 use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
 use crate::testing::{check_gradient, random};
+use fmnet::fmap::resolvent_mask;
 
 fn options(normalization: Normalization, activation: Activation) -> NetworkOptions {
     NetworkOptions { blocks: 2, width: 5, normalization, activation, ..NetworkOptions::default() }
