@@ -146,6 +146,7 @@ fn real_meshes_reach_the_target_with_their_topology() {
         "scape/mesh003.off",
         "tosca/dog/dog3.off",
         "faust/remeshed_15k/tr_reg_060.off",
+        "faust/registrations/tr_reg_000.ply",
     ] {
         let Some(mesh) = test_data::load(path) else { return };
         let mesh = repair(&mesh, &RepairOptions::default()).unwrap().mesh;
