@@ -8,6 +8,7 @@ use super::pencil::Pencil;
 use super::ritz::RitzPairs;
 use super::{EigenError, EigenOptions};
 use crate::Matrix;
+use std::cmp::Ordering;
 
 /// The shift is this share of Weyl's estimate of the last eigenvalue: enough to make the factor well conditioned, too
 /// little to bring the wanted eigenvalues together.
@@ -18,6 +19,11 @@ const RELATIVE_CUT: f64 = 1.6;
 const LEAST_AMPLIFICATION: f64 = 1.05;
 /// How often the cut is doubled, a shift refused by the factorisation enlarged, a missing eigenvector sought.
 const MAX_ATTEMPTS: usize = 12;
+
+/// Relative gap between eigenvalues that no rounding closes.
+const CLEAR_GAP: f64 = 1e-6;
+/// Relative residual that makes the pair after the last wanted one known well enough for the gap before it.
+const LEAST_ACCURACY_BEYOND: f64 = 1e-4;
 
 /// What the iteration found.
 pub(super) struct Found {
@@ -153,21 +159,19 @@ impl Search<'_> {
         Lanczos::new(filter, space, components.len(), self.pencil.n(), capacity, self.options.seed)
     }
 
-    /// Whether as many eigenvalues as were found lie below a number just above the last of them; `None` where that
-    /// is not asked for or cannot be decided.
+    /// Whether as many eigenvalues as were found lie below a number in the last gap between them; `None` where that is
+    /// not asked for or cannot be decided.
     fn check_complete(&self, filter: &Filter<'_>, ritz: &RitzPairs) -> Option<bool> {
         if !self.options.verify {
             return None;
         }
-        let wanted = self.wanted();
-        let last = filter.eigenvalue(ritz.values[wanted - 1]);
-        let above = ritz.values.get(wanted).map_or(f64::INFINITY, |&v| filter.eigenvalue(v));
-        // Just above, as the pair after the last may not have converged; as the multiplicity may go on beyond it, too.
-        let bound = last + (0.5 * (above - last)).min(1e-4 * last);
-        let below = self.analysis.negative_eigenvalues(&self.pencil.shifted(bound))?;
-        let beyond =
-            (wanted..ritz.values.len()).take_while(|&j| filter.eigenvalue(ritz.values[j]) < bound).count();
-        Some(below <= self.k + beyond)
+        let (found, bound) = last_gap(filter, ritz, self.wanted())?;
+        let found = found + self.pencil.components.len();
+        match self.analysis.negative_eigenvalues(&self.pencil.shifted(bound))?.cmp(&found) {
+            Ordering::Less => None,
+            Ordering::Equal => Some(true),
+            Ordering::Greater => Some(false),
+        }
     }
 
     fn not_converged(&self, worst: f64, residuals: Vec<f64>) -> EigenError {
@@ -198,6 +202,20 @@ impl Search<'_> {
         let eigenvalues = ritz.values[..wanted].iter().map(|&v| filter.eigenvalue(v)).collect();
         Found { eigenvalues, eigenvectors, stats: self.stats }
     }
+}
+
+/// How many of the wanted eigenvalues come before the last clear gap in the spectrum, and a number in that gap.
+///
+/// The gap after the last wanted one counts if the pair beyond it is known well enough. Where a multiple eigenvalue is
+/// cut off there, the gap is the one before it.
+fn last_gap(filter: &Filter<'_>, ritz: &RitzPairs, wanted: usize) -> Option<(usize, f64)> {
+    let beyond_known = wanted < ritz.values.len() && ritz.residual(wanted) < LEAST_ACCURACY_BEYOND;
+    let last = if beyond_known { wanted } else { wanted - 1 };
+    (1..=last).rev().find_map(|count| {
+        let below = filter.eigenvalue(ritz.values[count - 1]);
+        let gap = filter.eigenvalue(ritz.values[count]) - below;
+        (gap > CLEAR_GAP * below).then_some((count, below + 0.5 * gap))
+    })
 }
 
 /// Blocks until the residual has come down by `ratio`: about one for each digit.

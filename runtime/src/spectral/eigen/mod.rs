@@ -14,6 +14,8 @@ mod lanczos;
 mod orthonormalise;
 mod panel;
 mod pencil;
+#[cfg(test)]
+mod reference_tests;
 mod ritz;
 #[cfg(test)]
 mod tests;
