@@ -17,6 +17,7 @@ mod demo;
 mod flip;
 mod gait;
 mod implicit;
+mod loft;
 mod math;
 mod options;
 mod polygonize;

@@ -84,7 +84,7 @@ impl Species {
         let dog = quadruped::Proportions::default();
         match self {
             Self::Man => {
-                biped::recipe(&biped::Proportions { shoulders: 1.06, chest: 1.04, hips: 0.97, ..adult })
+                biped::recipe(&biped::Proportions { shoulders: 1.06, chest: 1.05, waist: 1.07, hips: 0.97, ..adult })
             }
             Self::Woman => biped::recipe(&biped::Proportions {
                 height: 1.65,
