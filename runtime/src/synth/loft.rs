@@ -94,7 +94,8 @@ mod tests {
         let station = |y: f64, side: f64| Station { center: [0.0, y, 0.0], side, front: 0.3, back: 0.2 };
         let stations = vec![station(0.0, 0.4), station(1.0, 0.5), station(3.0, 0.2)];
         let tube = Loft { stations, upright: true };
-        for surface in [[0.4, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 1.0, 0.3], [0.0, 2.5, -0.2], [0.0, 3.16, 0.0]] {
+        for surface in [[0.4, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 1.0, 0.3], [0.0, 2.5, -0.2], [0.0, 3.16, 0.0]]
+        {
             assert!(tube.distance(surface).abs() < 1e-12, "{surface:?}: {}", tube.distance(surface));
         }
     }

@@ -161,12 +161,15 @@ impl Grid {
         let mut blocks: Vec<Block> = (0..n_blocks).into_par_iter().map(|b| self.survey(parts, b)).collect();
         let mut wanted: Vec<usize> = (0..n_blocks).filter(|&b| !blocks[b].values.is_empty()).collect();
         while !wanted.is_empty() {
-            let values: Vec<Vec<f64>> = wanted.par_iter().map(|&b| self.values(parts, &blocks[b], b)).collect();
+            let values: Vec<Vec<f64>> =
+                wanted.par_iter().map(|&b| self.values(parts, &blocks[b], b)).collect();
             wanted.iter().zip(values).for_each(|(&b, values)| blocks[b].values = values);
-            let doubtful = wanted.iter().flat_map(|&b| self.neighbors(b).into_iter().map(move |other| (b, other)));
+            let doubtful =
+                wanted.iter().flat_map(|&b| self.neighbors(b).into_iter().map(move |other| (b, other)));
             let unseen = |&(_, other): &(usize, usize)| blocks[other].values.is_empty();
             let touching = |&(b, other): &(usize, usize)| self.sides_disagree(&blocks, b, other);
-            let mut next: Vec<usize> = doubtful.filter(unseen).filter(touching).map(|(_, other)| other).collect();
+            let mut next: Vec<usize> =
+                doubtful.filter(unseen).filter(touching).map(|(_, other)| other).collect();
             next.sort_unstable();
             next.dedup();
             wanted = next;

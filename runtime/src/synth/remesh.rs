@@ -64,7 +64,8 @@ struct Collapser<'a> {
     tolerance: f64,
     /// Vertices whose cost in the queue is out of date. Costs mostly grow, so it is corrected when its turn comes.
     dirty: Vec<bool>,
-    queue: BinaryHeap<Reverse<(u64, u32)>>,
+    /// Cost, vertex, and the neighbour it is moved onto.
+    queue: BinaryHeap<Reverse<(u64, u32, u32)>>,
     alive: usize,
 }
 
@@ -114,19 +115,20 @@ impl<'a> Collapser<'a> {
             self.enqueue(vertex);
         }
         while self.alive > target {
-            let Some(Reverse((_, vertex))) = self.queue.pop() else { return };
-            if std::mem::take(&mut self.dirty[vertex as usize]) {
+            let Some(Reverse((_, vertex, into))) = self.queue.pop() else { return };
+            // Collapses two edges away do not change the cost, but may change what the topology allows.
+            if std::mem::take(&mut self.dirty[vertex as usize]) || !self.keeps_topology(vertex, into) {
                 self.enqueue(vertex);
-            } else if let Some((_, into)) = self.cheapest(vertex) {
+            } else {
                 self.collapse(vertex, into);
             }
         }
     }
 
     fn enqueue(&mut self, vertex: u32) {
-        if let Some((cost, _)) = self.cheapest(vertex) {
+        if let Some((cost, into)) = self.cheapest(vertex) {
             // Non-negative costs compare like their bits.
-            self.queue.push(Reverse((cost.to_bits(), vertex)));
+            self.queue.push(Reverse((cost.to_bits(), vertex, into)));
         }
     }
 

@@ -58,12 +58,18 @@ impl Influences {
 ///
 /// The time stepping is RKL1 (Meyer, Balsara and Aslam 2012): `s` stages take a step of up to `(s^2 + s) / 2` explicit
 /// ones, and weights stay between 0 and 1.
-pub(super) fn diffused_weights(skeleton: &Skeleton, bone_of: &[u8], neighbors: &Adjacency) -> Vec<Influences> {
+pub(super) fn diffused_weights(
+    skeleton: &Skeleton,
+    bone_of: &[u8],
+    neighbors: &Adjacency,
+) -> Vec<Influences> {
     assert!(skeleton.len() <= ROW, "a skeleton has at most {ROW} bones");
     let n = bone_of.len();
-    let mut softness: Vec<f32> = bone_of.iter().map(|&b| skeleton.bones[b as usize].softness as f32).collect();
+    let mut softness: Vec<f32> =
+        bone_of.iter().map(|&b| skeleton.bones[b as usize].softness as f32).collect();
     for _ in 0..12 {
-        softness = (0..n).into_par_iter().map(|i| 0.5 * (softness[i] + neighbors.mean(i, &softness))).collect();
+        softness =
+            (0..n).into_par_iter().map(|i| 0.5 * (softness[i] + neighbors.mean(i, &softness))).collect();
     }
     let one_bone = |&bone: &u8| std::array::from_fn(|b| if b == bone as usize { 1.0 } else { 0.0 });
     let mut weights: Vec<[f32; ROW]> = bone_of.iter().map(one_bone).collect();
