@@ -2,6 +2,7 @@
 //!
 //! Lengths are those of an adult 1.75 tall; a species scales regions of it.
 
+use super::loft::Station;
 use super::math::{Vec3, lerp, unit};
 use super::recipe::{FeatureKind, Girth, Join, Recipe};
 use crate::mesh::vec3;
@@ -145,7 +146,7 @@ impl Sculptor {
                 ("clavicle", CHEST, self.torso([0.03, 1.43, 0.0]), shoulder, 0.8),
                 ("upper_arm", CLAVICLE, shoulder, elbow, 0.55),
                 ("forearm", UPPER_ARM, elbow, wrist, 0.22),
-                ("hand", FOREARM, wrist, self.palm(0.095, 0.0, 0.0), 0.12),
+                ("hand", FOREARM, wrist, self.palm(0.095, 0.0, 0.0), 0.3),
                 ("fingers", HAND, self.palm(0.095, 0.0, 0.0), self.palm(0.18, 0.0, 0.0), 0.06),
                 ("thumb", HAND, self.palm(0.03, 0.026, 0.0), self.palm(0.085, 0.07, -0.01), 0.06),
                 ("thigh", PELVIS, self.hip(), knee, 0.9),
@@ -233,41 +234,34 @@ impl Sculptor {
         let to = self.to;
         let trunk = [PELVIS, LUMBAR, CHEST];
         let wide = |blend| Join { bones: &trunk, blend };
-        let front = [0.0, 0.0, 1.0];
-        let at = |x: f64, y: f64, z: f64| self.torso([x, y, z]);
-        let (low, navel, waist, ribs) =
-            (at(0.0, 0.93, 0.0), at(0.0, 1.04, 0.0), at(0.0, 1.13, 0.0), at(0.0, 1.24, 0.0));
-        let (breast, top) = (at(0.0, 1.33, -0.01), at(0.0, 1.4, -0.02));
-        let belly_height = self.height(1.05);
-        let recipe = &mut self.recipe;
-        let waist_width = 0.128 * to.waist;
-        recipe.flat_spindle(wide(0.06), low, navel, Girth(0.15 * to.hips, 0.145 * to.waist, 0.0), front, 0.7);
-        recipe.flat_spindle(wide(0.06), navel, waist, Girth(0.14 * to.waist, waist_width, 0.0), front, 0.76);
-        recipe.flat_spindle(wide(0.06), waist, ribs, Girth(waist_width, 0.142 * to.chest, 0.0), front, 0.78);
-        recipe.flat_spindle(
-            wide(0.06),
-            ribs,
-            breast,
-            Girth(0.142 * to.chest, 0.15 * to.chest, 0.004),
+        let mix = |a: f64, b: f64| 0.5 * (a + b);
+        let loin = mix(to.hips, to.waist);
+        // Height, centre in depth, half-width, and extents to the front and to the back.
+        let sections = [
+            (0.865, -0.01, 0.11 * to.hips, 0.06, 0.06),
+            (0.93, 0.0, 0.16 * to.hips, 0.09, 0.092 * to.buttocks),
+            (1.0, 0.0, 0.154 * loin, 0.094 * loin + 0.7 * to.belly, 0.088 * loin),
+            (1.07, 0.002, 0.14 * to.waist, 0.096 * to.waist + to.belly, 0.078 * to.waist),
+            (1.13, 0.002, 0.134 * to.waist, 0.093 * to.waist + 0.9 * to.belly, 0.076 * to.waist),
+            (1.2, 0.0, 0.139 * mix(to.waist, to.chest), 0.096 * to.chest + 0.45 * to.belly, 0.086 * to.chest),
+            (1.28, -0.005, 0.151 * to.chest, 0.106 * to.chest, 0.099 * to.chest),
+            (1.35, -0.012, 0.154 * to.chest, 0.1 * to.chest, 0.105 * to.chest),
+            (1.41, -0.022, 0.13 * to.chest, 0.074 * to.chest, 0.083 * to.chest),
+            (1.45, -0.03, 0.085 * to.neck, 0.055 * to.neck, 0.058 * to.neck),
+        ];
+        let stations = sections.map(|(y, z, side, front, back)| Station {
+            center: [0.0, self.height(y), z],
+            side,
             front,
-            0.76,
-        );
-        recipe.flat_spindle(
-            wide(0.05),
-            breast,
-            top,
-            Girth(0.14 * to.chest, 0.095 * to.chest, 0.0),
-            front,
-            0.72,
-        );
-        let belly = [0.115 * to.waist, 0.12, 0.06 + to.belly];
-        recipe.ellipsoid(wide(0.06), [0.0, belly_height, 0.045 + 0.5 * to.belly], belly);
+            back,
+        });
+        self.recipe.tube(wide(0.06), stations.to_vec(), true);
         for side in 0..2 {
             self.trunk_side(side);
         }
-        let spine = Join { bones: &trunk, blend: 0.03 };
-        let (tail, nape) = (self.height(1.02), self.height(1.3));
-        let back = 0.108 * to.waist;
+        let spine = Join { bones: &trunk, blend: 0.035 };
+        let (tail, nape) = (self.height(1.05), self.height(1.34));
+        let back = 0.08 * to.waist;
         self.recipe.carve(
             spine,
             [0.0, 0.5 * (tail + nape), -back - 0.012],
@@ -373,7 +367,7 @@ impl Sculptor {
             lower,
             near,
             far,
-            Girth(0.037 * girth, 0.0275 * girth, 0.003),
+            Girth(0.037 * girth, 0.0255 * girth, 0.003),
             on(BACK_OF_HAND),
             0.86,
         );
@@ -456,7 +450,7 @@ impl Sculptor {
         let foot = Join { bones: &[limb(FOOT, side)], blend: 0.022 * size };
         let (ankle, heel) = (at(0.0, 0.0, 0.0), at(0.0, -0.052, -0.042));
         let (instep, ball) = (at(-0.004, -0.03, 0.05), at(-0.002, -0.062, 0.125));
-        let malleoli = [at(0.03, 0.002, -0.004), at(-0.03, 0.01, 0.004)];
+        let malleoli = [at(0.025, 0.002, -0.004), at(-0.025, 0.01, 0.004)];
         let (tendon, sole) = (at(0.0, 0.03, -0.03), at(0.012, -0.063, 0.04));
         // Toes, big toe first: place, reach and girth.
         let toes = [(-0.026, 0.19, 0.0155), (-0.004, 0.189, 0.0115), (0.012, 0.183, 0.011)];
@@ -482,7 +476,7 @@ impl Sculptor {
             recipe.ellipsoid(
                 Join { blend: 0.015 * size, ..foot },
                 bump,
-                vec3::scale([0.014, 0.017, 0.015], size),
+                vec3::scale([0.012, 0.015, 0.013], size),
             );
         }
         let join = Join { bones: &[limb(TOES, side)], blend: 0.006 * size };

@@ -32,6 +32,11 @@ impl Proxies {
                 spheres.push(Sphere { bone, center, radius: radius / recipe.magnified[bone] });
             };
             match part.solid {
+                Solid::Tube(ref loft) => {
+                    for station in &loft.stations {
+                        add(station.center, station.side.min(station.front).min(station.back));
+                    }
+                }
                 Solid::Spindle { a, b, ra, rb, flatten, .. } => {
                     for t in [0.0, 0.33, 0.67, 1.0] {
                         add(lerp(a, b, t), (ra + t * (rb - ra)) * flatten.min(1.0));

@@ -2,12 +2,11 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Write as _;
 use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::Mesh;
+use crate::io::{Attributes, IoError, write_atomically, write_mesh};
 
 use super::{Body, Species, SynthError, SynthOptions, Template, UNMATCHED};
 
@@ -97,14 +96,15 @@ pub fn write_dataset(
     let mut manifest = String::from("format = 1\n");
     for &species in &options.species {
         let place = folder.join(species.name());
-        fs::create_dir_all(&place).map_err(|source| SynthError::Write { path: place.clone(), source })?;
+        fs::create_dir_all(&place).map_err(|source| IoError::Write { path: place.clone(), source })?;
         let template = Template::new(species);
-        (0..options.per_species).into_par_iter().try_for_each(|individual| {
+        (0..options.per_species).into_par_iter().try_for_each(|individual| -> Result<(), SynthError> {
             let seed = (u64::from(options.seed) << 24) + individual as u64;
             let body = template.body(seed, &options.body)?;
             let name = name_of(species, individual);
-            write(&place.join(format!("{name}.ply")), &ply(&body.mesh))?;
-            write(&place.join(format!("{name}.vts")), &vts(&body))?;
+            write_mesh(&place.join(format!("{name}.ply")), &body.mesh, &Attributes::default())?;
+            let correspondence = vts(&body);
+            write_atomically(&place.join(format!("{name}.vts")), |file| file.write_all(&correspondence))?;
             progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
             Ok(())
         })?;
@@ -118,7 +118,8 @@ pub fn write_dataset(
             );
         }
     }
-    write(&folder.join("dataset.toml"), manifest.as_bytes())
+    write_atomically(&folder.join("dataset.toml"), |file| file.write_all(manifest.as_bytes()))?;
+    Ok(())
 }
 
 impl DatasetOptions {
@@ -138,38 +139,8 @@ fn name_of(species: Species, individual: usize) -> String {
     format!("{}_{individual:03}", species.name())
 }
 
-/// Writes to a temporary name first, so that no half-written file is ever taken for a whole one.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
-    let temporary = path.with_extension("partial");
-    let attempt = || -> std::io::Result<()> {
-        let mut file = fs::File::create(&temporary)?;
-        file.write_all(bytes)?;
-        fs::rename(&temporary, path)
-    };
-    attempt().map_err(|source| SynthError::Write { path: path.to_owned(), source })
-}
-
 fn vts(body: &Body) -> Vec<u8> {
     let line =
         |&vertex: &u32| if vertex == UNMATCHED { "0\n".to_owned() } else { format!("{}\n", vertex + 1) };
     body.landmarks.iter().map(line).collect::<String>().into_bytes()
-}
-
-/// A mesh as binary PLY, coordinates in single precision.
-fn ply(mesh: &Mesh) -> Vec<u8> {
-    let mut bytes = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        mesh.n_vertices(),
-        mesh.n_faces()
-    )
-    .into_bytes();
-    for x in mesh.vertices().iter().flatten() {
-        bytes.extend((*x as f32).to_le_bytes());
-    }
-    for face in mesh.faces() {
-        bytes.push(3);
-        face.iter().for_each(|i| bytes.extend(i.to_le_bytes()));
-    }
-    bytes
 }

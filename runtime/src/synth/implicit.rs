@@ -2,17 +2,20 @@
 
 use crate::mesh::vec3;
 
+use super::loft::Loft;
 use super::math::{Vec3, lerp};
 
 /// One solid of a body. All distances are first-order approximations (value over length of the gradient),
 /// accurate near the surface, which is where they are blended.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Solid {
     /// Spheres swept from `a` to `b`: radii `ra` and `rb` at the ends, and `bulge` more than their mean half-way.
     /// The cross-section is squeezed by `flatten` along the unit vector `axis`.
     Spindle { a: Vec3, b: Vec3, ra: f64, rb: f64, bulge: f64, axis: Vec3, flatten: f64 },
     /// An ellipsoid whose semi-axes `radii` lie along the orthonormal rows of `axes`.
     Ellipsoid { center: Vec3, radii: Vec3, axes: [Vec3; 3] },
+    /// A tube through cross-sections.
+    Tube(Loft),
 }
 
 /// A solid, how it joins the others, and the bones it may belong to.
@@ -25,12 +28,30 @@ pub(super) struct Part {
     pub(super) carve: bool,
     /// The bones that may move this part; the nearest one does.
     pub(super) bones: Vec<usize>,
+    /// A ball that holds the solid: centre and radius.
+    bound: (Vec3, f64),
+}
+
+impl Part {
+    pub(super) fn new(solid: Solid, blend: f64, carve: bool, bones: &[usize]) -> Self {
+        let bound = solid.bound();
+        Self { solid, blend, carve, bones: bones.to_vec(), bound }
+    }
+
+    /// Whether the bounding ball alone shows that the solid is farther than `distance` from `p`.
+    pub(super) fn is_beyond(&self, p: Vec3, distance: f64) -> bool {
+        let (center, radius) = self.bound;
+        let least = radius + distance;
+        let offset = vec3::sub(p, center);
+        least <= 0.0 || vec3::dot(offset, offset) > least * least
+    }
 }
 
 impl Solid {
     /// Approximate signed distance of `p`, negative inside.
     pub(super) fn distance(&self, p: Vec3) -> f64 {
         match *self {
+            Self::Tube(ref loft) => loft.distance(p),
             Self::Spindle { a, b, ra, rb, bulge, axis, flatten } => {
                 let stretch =
                     |v: Vec3| vec3::add(v, vec3::scale(axis, vec3::dot(v, axis) * (1.0 / flatten - 1.0)));
@@ -48,11 +69,9 @@ impl Solid {
                 let q: Vec3 = std::array::from_fn(|i| vec3::dot(offset, axes[i]) / radii[i]);
                 let level = vec3::norm(q);
                 let gradient = vec3::norm(std::array::from_fn(|i| q[i] / radii[i]));
-                if gradient > 0.0 {
-                    level * (level - 1.0) / gradient
-                } else {
-                    -radii.iter().fold(f64::MAX, |least, &r| least.min(r))
-                }
+                // Deep inside, along the longest axis, the approximation would exceed the least radius.
+                let least = radii.iter().fold(f64::MAX, |least, &r| least.min(r));
+                if gradient > 0.0 { (level * (level - 1.0) / gradient).max(-least) } else { -least }
             }
         }
     }
@@ -60,6 +79,7 @@ impl Solid {
     /// A ball that holds the solid: centre and radius.
     pub(super) fn bound(&self) -> (Vec3, f64) {
         match *self {
+            Self::Tube(ref loft) => loft.bound(),
             Self::Spindle { a, b, ra, rb, bulge, flatten, .. } => {
                 let radius = (ra.max(rb) + bulge.max(0.0)) * flatten.max(1.0);
                 (lerp(a, b, 0.5), 0.5 * vec3::distance(a, b) + radius)
@@ -75,6 +95,11 @@ impl Solid {
 pub(super) fn field<'a>(parts: impl Iterator<Item = &'a Part>, p: Vec3) -> f64 {
     let mut value = f64::INFINITY;
     for part in parts {
+        // A solid farther than the union by the width of the blend, or a hole that far, changes nothing. Twice the
+        // width, as distances to flat solids are underestimated.
+        if part.is_beyond(p, 2.0 * part.blend + if part.carve { -value } else { value }) {
+            continue;
+        }
         let distance = part.solid.distance(p);
         value = if part.carve {
             -smooth_min(-value, distance, part.blend)

@@ -17,6 +17,7 @@ mod demo;
 mod flip;
 mod gait;
 mod implicit;
+mod loft;
 mod math;
 mod options;
 mod polygonize;
@@ -32,8 +33,6 @@ mod species;
 mod template;
 #[cfg(test)]
 mod tests;
-
-use std::path::PathBuf;
 
 use thiserror::Error;
 
@@ -61,13 +60,8 @@ pub enum SynthError {
         range: &'static str,
     },
     /// A file or folder could not be written.
-    #[error("cannot write {}: {source}; is there space, and are you allowed to write there?", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] crate::io::IoError),
 }
 
 /// The individual of `species` with the given seed; to make many of one species, build its [`Template`] once.

@@ -10,7 +10,7 @@ use super::implicit::{Part, field};
 use super::math::Vec3;
 
 /// Cells along each side of a block of the grid.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 const CORNERS: usize = BLOCK + 1;
 
 /// A closed triangle mesh, and for each vertex the parts of the body that shape its neighbourhood.
@@ -29,9 +29,12 @@ struct Grid {
     blocks: [usize; 3],
 }
 
+#[derive(Default)]
 struct Block {
     active: Vec<u16>,
-    /// Values at the corners, x fastest; empty where the surface does not pass.
+    /// Whether its centre is inside, which stands for all of it where `values` is empty.
+    inside: bool,
+    /// Values at its own corners, x fastest; empty where the surface does not pass.
     values: Vec<f64>,
     /// First vertex of each cell, counted within the block, or `NONE`.
     cells: Vec<u32>,
@@ -45,8 +48,12 @@ const NONE: u32 = u32::MAX;
 /// The zero set of the smooth union of `parts`, sampled at the grid spacing `cell`; faces look outwards.
 pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
     let grid = Grid::around(parts, cell);
-    let n_blocks = grid.blocks.iter().product();
-    let blocks: Vec<Block> = (0..n_blocks).into_par_iter().map(|b| grid.sample(parts, b)).collect();
+    let mut blocks = grid.sample(parts);
+    let n_blocks = blocks.len();
+    let meshed: Vec<_> = (0..n_blocks).into_par_iter().map(|b| grid.place_vertices(&blocks, b)).collect();
+    for (block, (cells, sheets, vertices)) in blocks.iter_mut().zip(meshed) {
+        (block.cells, block.sheets, block.vertices) = (cells, sheets, vertices);
+    }
     let mut first = Vec::with_capacity(n_blocks);
     let (mut vertices, mut block_of) = (Vec::new(), Vec::new());
     for (b, block) in blocks.iter().enumerate() {
@@ -143,61 +150,145 @@ impl Grid {
         [b % nx, (b / nx) % ny, b / (nx * ny)]
     }
 
-    /// Evaluates the field in block `b`, unless the surface is far from it, and makes the vertices of its cells.
-    fn sample(&self, parts: &[Part], b: usize) -> Block {
-        let place = self.place(b);
-        let at = |corner: [usize; 3]| -> Vec3 {
-            std::array::from_fn(|i| self.origin[i] + self.cell * (place[i] * BLOCK + corner[i]) as f64)
-        };
-        let half = 0.5 * self.cell * BLOCK as f64;
-        let center = at([0; 3]).map(|x| x + half);
-        let reach = 3f64.sqrt() * half;
-        let mut block = Block {
-            active: self.active(parts, center, reach),
-            values: vec![],
-            cells: vec![],
-            sheets: vec![],
-            vertices: vec![],
-        };
-        let near = || block.active.iter().map(|&part| &parts[part as usize]);
-        if near().all(|part| part.carve) || field(near(), center).abs() > 1.8 * reach {
-            return block;
+    fn corner(&self, place: [usize; 3], offset: [usize; 3]) -> Vec3 {
+        std::array::from_fn(|i| self.origin[i] + self.cell * (place[i] * BLOCK + offset[i]) as f64)
+    }
+
+    /// Evaluates the field in all blocks that the surface may pass: those near it by the value at their centre, and
+    /// those that a neighbour disagrees with about where the inside is, until none is left.
+    fn sample(&self, parts: &[Part]) -> Vec<Block> {
+        let n_blocks = self.blocks.iter().product();
+        let mut blocks: Vec<Block> = (0..n_blocks).into_par_iter().map(|b| self.survey(parts, b)).collect();
+        let mut wanted: Vec<usize> = (0..n_blocks).filter(|&b| !blocks[b].values.is_empty()).collect();
+        while !wanted.is_empty() {
+            let values: Vec<Vec<f64>> =
+                wanted.par_iter().map(|&b| self.values(parts, &blocks[b], b)).collect();
+            wanted.iter().zip(values).for_each(|(&b, values)| blocks[b].values = values);
+            let doubtful =
+                wanted.iter().flat_map(|&b| self.neighbors(b).into_iter().map(move |other| (b, other)));
+            let unseen = |&(_, other): &(usize, usize)| blocks[other].values.is_empty();
+            let touching = |&(b, other): &(usize, usize)| self.sides_disagree(&blocks, b, other);
+            let mut next: Vec<usize> =
+                doubtful.filter(unseen).filter(touching).map(|(_, other)| other).collect();
+            next.sort_unstable();
+            next.dedup();
+            wanted = next;
         }
-        let values: Vec<f64> = (0..CORNERS.pow(3))
-            .map(|c| field(near(), at([c % CORNERS, (c / CORNERS) % CORNERS, c / CORNERS.pow(2)])))
-            .collect();
-        block.cells = vec![NONE; BLOCK.pow(3)];
+        blocks
+    }
+
+    /// Whether a corner of the evaluated block `b` next to the block `other` is on the other side of the surface.
+    fn sides_disagree(&self, blocks: &[Block], b: usize, other: usize) -> bool {
+        let (from, to) = (self.place(b), self.place(other));
+        let next_to = |c: usize| {
+            let offset = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
+            (0..3).all(|i| match to[i].cmp(&from[i]) {
+                std::cmp::Ordering::Less => offset[i] == 0,
+                std::cmp::Ordering::Equal => true,
+                std::cmp::Ordering::Greater => offset[i] == BLOCK - 1,
+            })
+        };
+        let values = blocks[b].values.iter().enumerate();
+        values.filter(|&(c, _)| next_to(c)).any(|(_, &value)| (value < 0.0) != blocks[other].inside)
+    }
+
+    /// The blocks that share a corner with block `b`.
+    fn neighbors(&self, b: usize) -> Vec<usize> {
+        let place = self.place(b);
+        let offsets = (0..27).map(|c| [c % 3, (c / 3) % 3, c / 9]);
+        let shifted = offsets.filter_map(|offset| {
+            let mut other = [0; 3];
+            for i in 0..3 {
+                other[i] = (place[i] + offset[i]).checked_sub(1).filter(|&x| x < self.blocks[i])?;
+            }
+            Some(other[0] + self.blocks[0] * (other[1] + self.blocks[1] * other[2]))
+        });
+        shifted.filter(|&other| other != b).collect()
+    }
+
+    /// The parts that matter in block `b`, which side its centre is on, and, as one placeholder value, whether the
+    /// surface may pass.
+    fn survey(&self, parts: &[Part], b: usize) -> Block {
+        let half = 0.5 * self.cell * BLOCK as f64;
+        let center = self.corner(self.place(b), [0; 3]).map(|x| x + half);
+        let reach = 3f64.sqrt() * half;
+        let active = self.active(parts, center, reach);
+        if active.iter().all(|&part| parts[part as usize].carve) {
+            return Block { active, ..Block::default() };
+        }
+        let value = field(active.iter().map(|&part| &parts[part as usize]), center);
+        let values = if value.abs() < 1.4 * reach { vec![value] } else { vec![] };
+        Block { active, inside: value < 0.0, values, ..Block::default() }
+    }
+
+    /// Values at the block's own corners.
+    fn values(&self, parts: &[Part], block: &Block, b: usize) -> Vec<f64> {
+        let place = self.place(b);
+        let at = |c: usize| self.corner(place, [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)]);
+        let near = || block.active.iter().map(|&part| &parts[part as usize]);
+        (0..BLOCK.pow(3)).map(|c| field(near(), at(c))).collect()
+    }
+
+    /// Values at the corners of the cells of block `b`, `CORNERS` along each side: its own and its neighbours'.
+    fn corner_values(&self, blocks: &[Block], b: usize) -> Vec<f64> {
+        let place = self.place(b);
+        let value = |c: usize| {
+            let corner = [c % CORNERS, (c / CORNERS) % CORNERS, c / CORNERS.pow(2)];
+            let owner: [usize; 3] = std::array::from_fn(|i| place[i] + corner[i] / BLOCK);
+            if (0..3).any(|i| owner[i] >= self.blocks[i]) {
+                return f64::INFINITY;
+            }
+            let block = &blocks[owner[0] + self.blocks[0] * (owner[1] + self.blocks[1] * owner[2])];
+            let [i, j, k] = corner.map(|c| c % BLOCK);
+            let far = if block.inside { f64::NEG_INFINITY } else { f64::INFINITY };
+            block.values.get(i + BLOCK * (j + BLOCK * k)).copied().unwrap_or(far)
+        };
+        (0..CORNERS.pow(3)).map(value).collect()
+    }
+
+    /// The vertices of the cells of block `b`: first vertex of each cell, edges on further sheets, positions.
+    fn place_vertices(&self, blocks: &[Block], b: usize) -> (Vec<u32>, Vec<(u16, u8, u32)>, Vec<Vec3>) {
+        let (mut cells, mut further, mut vertices) = (Vec::new(), Vec::new(), Vec::new());
+        let place = self.place(b);
+        let values = self.corner_values(blocks, b);
+        if values.iter().all(|&x| x < 0.0) || values.iter().all(|&x| x >= 0.0) {
+            return (cells, further, vertices);
+        }
+        cells = vec![NONE; BLOCK.pow(3)];
         for c in 0..BLOCK.pow(3) {
             let cell = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
-            let corner = at(cell);
+            let corner = self.corner(place, cell);
             for (sheet, edges) in sheets(&values, cell).into_iter().enumerate() {
-                let vertex = block.vertices.len() as u32;
+                let vertex = vertices.len() as u32;
                 if sheet == 0 {
-                    block.cells[c] = vertex;
+                    cells[c] = vertex;
                 } else {
-                    block.sheets.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
+                    further.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
                 }
                 let offset = mean_crossing(&values, cell, &edges);
-                block.vertices.push(std::array::from_fn(|axis| corner[axis] + self.cell * offset[axis]));
+                vertices.push(std::array::from_fn(|axis| corner[axis] + self.cell * offset[axis]));
             }
         }
-        block.values = values;
-        block
+        (cells, further, vertices)
     }
 
     /// Parts whose distance at `center` is small enough to matter within `reach` of it.
     fn active(&self, parts: &[Part], center: Vec3, reach: f64) -> Vec<u16> {
-        let matters = |part: &Part| part.solid.distance(center) < 1.7 * reach + part.blend + 0.5 * self.cell;
+        let matters = |part: &Part| {
+            let limit = 1.5 * reach + part.blend + 0.5 * self.cell;
+            !part.is_beyond(center, limit + part.blend) && part.solid.distance(center) < limit
+        };
         (0..parts.len()).filter(|&i| matters(&parts[i])).map(|i| i as u16).collect()
     }
 
     /// The quadrilaterals around the crossed grid edges that start in block `b`, counter-clockwise from outside.
     fn quads(&self, blocks: &[Block], first: &[u32], b: usize) -> Vec<[u32; 4]> {
         let (block, place, mut quads) = (&blocks[b], self.place(b), Vec::new());
-        if block.values.is_empty() {
+        if block.cells.is_empty() {
             return quads;
         }
-        let inside = |c: [usize; 3]| block.values[c[0] + CORNERS * (c[1] + CORNERS * c[2])] < 0.0;
+        let values = self.corner_values(blocks, b);
+        let inside = |c: [usize; 3]| values[c[0] + CORNERS * (c[1] + CORNERS * c[2])] < 0.0;
         for c in 0..BLOCK.pow(3) {
             let corner = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
             for axis in 0..3 {
@@ -302,7 +393,7 @@ mod tests {
     fn ball_has_the_area_of_a_ball_and_looks_outwards() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let solid = Solid::Ellipsoid { center: [0.3, 0.1, 0.2], radii: [1.0; 3], axes };
-        let ball = polygonize(&[Part { solid, blend: 0.1, carve: false, bones: vec![0] }], 0.05);
+        let ball = polygonize(&[Part::new(solid, 0.1, false, &[0])], 0.05);
         let mesh = crate::Mesh::new(ball.vertices, ball.faces).unwrap();
         assert_eq!(mesh.n_faces(), 2 * mesh.n_vertices() - 4);
         let volume: f64 =

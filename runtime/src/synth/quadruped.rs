@@ -2,6 +2,7 @@
 //!
 //! Lengths are those of a dog 0.6 high at the withers; a species scales regions of it, then the whole.
 
+use super::loft::Station;
 use super::math::{Vec3, lerp, unit};
 use super::recipe::{FeatureKind, Girth, Join, Recipe};
 use crate::mesh::vec3;
@@ -121,18 +122,18 @@ impl Proportions {
     pub(super) fn horse() -> Self {
         Self {
             size: 2.15,
-            legs: 1.42,
-            leg_girth: 0.92,
-            trunk: 1.04,
-            chest: 1.02,
-            loin: 1.16,
-            rump: 1.12,
-            neck: 1.55,
-            neck_girth: 1.1,
+            legs: 1.34,
+            leg_girth: 0.98,
+            trunk: 1.06,
+            chest: 1.06,
+            loin: 1.24,
+            rump: 1.22,
+            neck: 1.5,
+            neck_girth: 1.22,
             neck_rise: 52.0,
             head: 1.02,
-            muzzle: 1.75,
-            muzzle_girth: 1.3,
+            muzzle: 1.45,
+            muzzle_girth: 1.5,
             ear: 0.75,
             ear_width: 0.7,
             tail: 1.25,
@@ -285,7 +286,7 @@ impl Sculptor {
 
     /// A point of the tail's axis, from its root (0) to its tip (1), as an arc that turns downwards.
     fn tail(&self, t: f64) -> Vec3 {
-        let root = self.at([0.0, 0.555, -0.32 - 0.02 * self.to.rump]);
+        let root = self.at([0.0, 0.515 + 0.022 * self.to.rump, -0.28 - 0.035 * self.to.rump]);
         let drop = self.to.tail_drop.to_radians();
         let length = 0.32 * self.to.tail * t;
         vec3::add(root, [0.0, -drop.sin() * length, -drop.cos() * length])
@@ -305,19 +306,27 @@ impl Sculptor {
         use bone::*;
         let to = self.to;
         let join = Join { bones: &[PELVIS, LUMBAR, CHEST], blend: 0.07 };
-        let at = |y: f64, z: f64| self.at([0.0, y, z]);
-        let long = |z: f64| z * to.trunk;
-        let (chest, loin, rump) = (at(0.455, 0.13), at(0.485, -0.08), at(0.5, -0.23));
-        let (withers, back, croup) = (at(0.555, 0.15), at(0.545, -0.05), at(0.545, -0.25));
-        let brisket = at(0.40, 0.2);
-        let recipe = &mut self.recipe;
-        let (deep, wide) = (0.135 * to.chest, 0.098 * to.chest);
-        recipe.ellipsoid(join, chest, [wide, deep, long(0.19)]);
-        recipe.ellipsoid(join, loin, [0.083 * to.loin, 0.088 * to.loin, long(0.19)]);
-        recipe.ellipsoid(join, rump, [0.085 * to.rump, 0.092 * to.rump, long(0.12)]);
-        recipe.ellipsoid(join, brisket, [0.06 * to.chest, 0.06 * to.chest, 0.09]);
-        recipe.spindle(join, withers, back, Girth(0.045, 0.045 * to.loin, 0.0));
-        recipe.spindle(join, back, croup, Girth(0.045 * to.loin, 0.05 * to.rump, 0.0));
+        let (chest, loin, rump) = (to.chest, to.loin, to.rump);
+        let mix = |a: f64, b: f64| 0.5 * (a + b);
+        // Place along the body, height, half-width, and extents upwards and downwards.
+        let sections = [
+            (-0.345, 0.505, 0.055 * rump, 0.055 * rump, 0.06 * rump),
+            (-0.29, 0.502, 0.082 * rump, 0.078 * rump, 0.088 * rump),
+            (-0.21, 0.5, 0.088 * rump, 0.084 * rump, 0.1 * rump),
+            (-0.1, 0.49, 0.082 * loin, 0.08 * loin, 0.085 * loin),
+            (0.0, 0.48, 0.088 * mix(loin, chest), 0.088 * mix(loin, chest), 0.108 * mix(loin, chest)),
+            (0.1, 0.465, 0.097 * chest, 0.112 * chest, 0.138 * chest),
+            (0.18, 0.46, 0.096 * chest, 0.12 * chest, 0.138 * chest),
+            (0.255, 0.455, 0.076 * chest, 0.098 * chest, 0.105 * chest),
+            (0.31, 0.45, 0.045 * chest, 0.05 * chest, 0.06 * chest),
+        ];
+        let stations = sections.map(|(z, y, side, front, back)| Station {
+            center: self.at([0.0, y, z]),
+            side,
+            front,
+            back,
+        });
+        self.recipe.tube(join, stations.to_vec(), false);
     }
 
     fn neck_and_tail(&mut self) {
@@ -375,7 +384,7 @@ impl Sculptor {
             recipe.ellipsoid(join(0.014), lip, by([0.016 * wide, 0.016, 0.022]));
         }
         for (eye, brow) in eyes.into_iter().zip(brows) {
-            recipe.carve(join(0.014), eye, by([0.012, 0.011, 0.013]));
+            recipe.carve(join(0.016), eye, by([0.009, 0.009, 0.012]));
             recipe.ellipsoid(join(0.016), brow, by([0.016, 0.013, 0.016]));
         }
         recipe.ellipsoid(join(0.008), nose, by([0.013 * wide, 0.01, 0.011]));
@@ -394,8 +403,8 @@ impl Sculptor {
             let [ra, rb, bulge] = radii.map(|r| r * girth);
             self.recipe.spindle(Join { bones: &[limb(name, side)], blend }, a, b, Girth(ra, rb, bulge));
         };
-        rod(BLADE, 0.05, blade, shoulder, [0.045, 0.05, 0.01]);
-        rod(UPPER_ARM, 0.045, shoulder, elbow, [0.046, 0.038, 0.004]);
+        rod(BLADE, 0.06, blade, shoulder, [0.036, 0.042, 0.006]);
+        rod(UPPER_ARM, 0.05, shoulder, elbow, [0.04, 0.037, 0.004]);
         rod(FOREARM, 0.03, elbow, wrist, [0.034, 0.0215, 0.001]);
         rod(FOREARM, 0.02, lerp(elbow, wrist, 0.05), lerp(elbow, wrist, 0.45), [0.036, 0.028, 0.0]);
         let point = vec3::add(elbow, [0.0, 0.014, -0.024]);

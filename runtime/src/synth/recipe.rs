@@ -1,6 +1,7 @@
 //! What a species is made of: the solids of its body at rest, its bones, and where individuals differ.
 
 use super::implicit::{Part, Solid};
+use super::loft::{Loft, Station};
 use super::math::{Vec3, perpendicular, unit};
 use super::skeleton::Skeleton;
 use crate::mesh::vec3;
@@ -86,6 +87,11 @@ impl Recipe {
         self.push(join, Solid::Ellipsoid { center, radii, axes: upright(up) }, false);
     }
 
+    /// Adds a tube through cross-sections; see [`Loft`].
+    pub(super) fn tube(&mut self, join: Join, stations: Vec<Station>, upright: bool) {
+        self.push(join, Solid::Tube(Loft { stations, upright }), false);
+    }
+
     /// Takes an ellipsoid away.
     pub(super) fn carve(&mut self, join: Join, center: Vec3, radii: Vec3) {
         self.push(join, Solid::Ellipsoid { center, radii, axes: upright([0.0, 1.0, 0.0]) }, true);
@@ -104,8 +110,9 @@ impl Recipe {
             by(&mut bone.tail);
         }
         for part in &mut self.parts {
-            part.blend *= factor;
-            match &mut part.solid {
+            let mut solid = part.solid.clone();
+            match &mut solid {
+                Solid::Tube(loft) => loft.scale(factor),
                 Solid::Spindle { a, b, ra, rb, bulge, .. } => {
                     by(a);
                     by(b);
@@ -118,6 +125,7 @@ impl Recipe {
                     by(radii);
                 }
             }
+            *part = Part::new(solid, factor * part.blend, part.carve, &part.bones);
         }
         for feature in &mut self.features {
             by(&mut feature.center);
@@ -128,7 +136,7 @@ impl Recipe {
     }
 
     fn push(&mut self, join: Join, solid: Solid, carve: bool) {
-        self.parts.push(Part { solid, blend: join.blend, carve, bones: join.bones.to_vec() });
+        self.parts.push(Part::new(solid, join.blend, carve, join.bones));
     }
 }
 

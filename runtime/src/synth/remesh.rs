@@ -62,7 +62,9 @@ struct Collapser<'a> {
     sizes: Vec<f64>,
     /// Squared distance to the surface that doubles the cost of a collapse.
     tolerance: f64,
-    stamps: Vec<u32>,
+    /// Vertices whose cost in the queue is out of date. Costs mostly grow, so it is corrected when its turn comes.
+    dirty: Vec<bool>,
+    /// Cost, vertex, and the neighbour it is moved onto.
     queue: BinaryHeap<Reverse<(u64, u32, u32)>>,
     alive: usize,
 }
@@ -102,7 +104,7 @@ impl<'a> Collapser<'a> {
             quadrics,
             sizes,
             tolerance,
-            stamps: vec![0; n],
+            dirty: vec![false; n],
             queue: BinaryHeap::with_capacity(2 * n),
             alive: n,
         }
@@ -113,21 +115,20 @@ impl<'a> Collapser<'a> {
             self.enqueue(vertex);
         }
         while self.alive > target {
-            let Some(Reverse((_, vertex, stamp))) = self.queue.pop() else { return };
-            if self.stamps[vertex as usize] != stamp {
-                continue;
-            }
-            if let Some((_, into)) = self.cheapest(vertex) {
+            let Some(Reverse((_, vertex, into))) = self.queue.pop() else { return };
+            // Collapses two edges away do not change the cost, but may change what the topology allows.
+            if std::mem::take(&mut self.dirty[vertex as usize]) || !self.keeps_topology(vertex, into) {
+                self.enqueue(vertex);
+            } else {
                 self.collapse(vertex, into);
             }
         }
     }
 
     fn enqueue(&mut self, vertex: u32) {
-        self.stamps[vertex as usize] += 1;
-        if let Some((cost, _)) = self.cheapest(vertex) {
+        if let Some((cost, into)) = self.cheapest(vertex) {
             // Non-negative costs compare like their bits.
-            self.queue.push(Reverse((cost.to_bits(), vertex, self.stamps[vertex as usize])));
+            self.queue.push(Reverse((cost.to_bits(), vertex, into)));
         }
     }
 
@@ -211,13 +212,11 @@ impl<'a> Collapser<'a> {
         }
         let quadric = self.quadrics[vertex as usize];
         self.quadrics[into as usize].add(&quadric);
-        self.stamps[vertex as usize] += 1;
         self.alive -= 1;
-        let mut touched = self.neighbors(into);
-        touched.push(into);
-        for i in touched {
-            self.enqueue(i);
+        for i in self.neighbors(into) {
+            self.dirty[i as usize] = true;
         }
+        self.dirty[into as usize] = true;
     }
 }
 

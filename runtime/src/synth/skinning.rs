@@ -12,8 +12,13 @@ use super::skeleton::Skeleton;
 
 /// Bones that may move one vertex.
 const INFLUENCES: usize = 6;
-/// Rounds of averaging: weights spread over about the square root of this many edges.
-const DIFFUSION_ROUNDS: usize = 80;
+/// Most bones of a skeleton: a row of weights.
+const ROW: usize = 32;
+/// Time of the diffusion in explicit steps: weights spread over about the square root of this many edges.
+const DIFFUSION_TIME: f32 = 80.0;
+/// The diffusion is done in this many steps of this many stages each.
+const STEPS: usize = 2;
+const STAGES: usize = 9;
 
 /// The bones that move a vertex, and their shares, which sum to 1; unused places have share 0.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,7 +40,7 @@ impl Influences {
 
     /// The largest shares of a dense row of weights, scaled to sum to 1.
     fn from_row(row: &[f32]) -> Self {
-        let mut order: Vec<usize> = (0..row.len()).filter(|&bone| row[bone] > 0.0).collect();
+        let mut order: Vec<usize> = (0..row.len()).filter(|&bone| row[bone] > 1e-3).collect();
         order.sort_by(|&a, &b| row[b].total_cmp(&row[a]).then(a.cmp(&b)));
         order.truncate(INFLUENCES);
         let sum: f64 = order.iter().map(|&bone| f64::from(row[bone])).sum();
@@ -50,37 +55,50 @@ impl Influences {
 
 /// Weights that start at 1 for the bone of each vertex and spread over the surface, so that they follow the skin
 /// and do not leak from the arm to the trunk. How far they spread is the softness of the bone around.
+///
+/// The time stepping is RKL1 (Meyer, Balsara and Aslam 2012): `s` stages take a step of up to `(s^2 + s) / 2` explicit
+/// ones, and weights stay between 0 and 1.
 pub(super) fn diffused_weights(
     skeleton: &Skeleton,
     bone_of: &[u8],
     neighbors: &Adjacency,
 ) -> Vec<Influences> {
-    let (n, n_bones) = (bone_of.len(), skeleton.len());
+    assert!(skeleton.len() <= ROW, "a skeleton has at most {ROW} bones");
+    let n = bone_of.len();
     let mut softness: Vec<f32> =
         bone_of.iter().map(|&b| skeleton.bones[b as usize].softness as f32).collect();
     for _ in 0..12 {
         softness =
             (0..n).into_par_iter().map(|i| 0.5 * (softness[i] + neighbors.mean(i, &softness))).collect();
     }
-    let mut weights = vec![0f32; n * n_bones];
-    for (row, &bone) in weights.chunks_exact_mut(n_bones).zip(bone_of) {
-        row[bone as usize] = 1.0;
+    let one_bone = |&bone: &u8| std::array::from_fn(|b| if b == bone as usize { 1.0 } else { 0.0 });
+    let mut weights: Vec<[f32; ROW]> = bone_of.iter().map(one_bone).collect();
+    let time = DIFFUSION_TIME / STEPS as f32;
+    let stages = STAGES as f32;
+    for _ in 0..STEPS {
+        let mut before = weights.clone();
+        for stage in 1..=STAGES {
+            let j = stage as f32;
+            let (mu, nu) = ((2.0 * j - 1.0) / j, (1.0 - j) / j);
+            let step = mu * 2.0 * time / (stages * stages + stages);
+            // `before` holds the stage before the last, and takes the next one.
+            before.par_iter_mut().enumerate().for_each(|(i, row)| {
+                let (last, around) = (&weights[i], neighbors.of(i));
+                let take = step * softness[i] / around.len().max(1) as f32;
+                let keep = mu - step * softness[i];
+                for (x, y) in row.iter_mut().zip(last) {
+                    *x = nu * *x + keep * y;
+                }
+                for &j in around {
+                    for (x, y) in row.iter_mut().zip(&weights[j as usize]) {
+                        *x += take * y;
+                    }
+                }
+            });
+            std::mem::swap(&mut weights, &mut before);
+        }
     }
-    let mut next = weights.clone();
-    for _ in 0..DIFFUSION_ROUNDS {
-        next.par_chunks_exact_mut(n_bones).enumerate().for_each(|(i, row)| {
-            let around = neighbors.of(i);
-            let (keep, take) = (1.0 - softness[i], softness[i] / around.len().max(1) as f32);
-            row.copy_from_slice(&weights[i * n_bones..(i + 1) * n_bones]);
-            row.iter_mut().for_each(|x| *x *= keep);
-            for &j in around {
-                let other = &weights[j as usize * n_bones..(j as usize + 1) * n_bones];
-                row.iter_mut().zip(other).for_each(|(x, y)| *x += take * y);
-            }
-        });
-        std::mem::swap(&mut weights, &mut next);
-    }
-    weights.par_chunks_exact(n_bones).map(Influences::from_row).collect()
+    weights.par_iter().map(|row| Influences::from_row(row)).collect()
 }
 
 /// Where joints go when every bone is scaled by `scales[bone]` along the axes of its frame.

@@ -83,9 +83,13 @@ impl Species {
         let adult = biped::Proportions::default();
         let dog = quadruped::Proportions::default();
         match self {
-            Self::Man => {
-                biped::recipe(&biped::Proportions { shoulders: 1.06, chest: 1.04, hips: 0.97, ..adult })
-            }
+            Self::Man => biped::recipe(&biped::Proportions {
+                shoulders: 1.06,
+                chest: 1.05,
+                waist: 1.07,
+                hips: 0.97,
+                ..adult
+            }),
             Self::Woman => biped::recipe(&biped::Proportions {
                 height: 1.65,
                 neck: 0.86,

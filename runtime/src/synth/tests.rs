@@ -53,6 +53,7 @@ fn volume(mesh: &Mesh) -> f64 {
 fn templates_are_spheres_of_the_right_size() {
     for species in Species::ALL {
         let template = Template::new(species);
+        assert_eq!(Species::from_name(species.name()), Some(species));
         let rest = template.rest_mesh();
         assert_closed_manifold_sphere(&rest, species.name());
         assert!(volume(&rest) > 0.0, "{}: looks inwards", species.name());
