@@ -110,6 +110,22 @@ mod tests {
     }
 
     #[test]
+    fn a_write_under_way_can_be_cleaned_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.txt");
+        let interrupted = write_atomically(&path, |w| {
+            w.write_all(b"half")?;
+            let names: Vec<_> = fs::read_dir(folder.path())?.map(|entry| entry.unwrap().path()).collect();
+            assert!(!names.is_empty() && names.iter().all(|name| lock().contains(name)));
+            // As remove_temporary_files does for all, which would disturb other tests.
+            names.iter().try_for_each(fs::remove_file)
+        });
+        assert!(interrupted.is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(!lock().iter().any(|name| name.starts_with(folder.path())));
+    }
+
+    #[test]
     fn an_absent_folder_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("absent/map.txt");

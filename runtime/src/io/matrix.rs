@@ -127,8 +127,8 @@ pub(super) fn decode<T: NpyNumber>(bytes: &[u8]) -> Parsed<Matrix<T>> {
     let header = Header::parse(bytes)?;
     let size = header.kind.size();
     let body = &bytes[header.body..];
-    let needed = header.rows as u128 * header.cols as u128 * size as u128;
-    if needed > body.len() as u128 {
+    let n = header.rows.checked_mul(header.cols).filter(|&n| n <= body.len() / size);
+    let Some(n) = n else {
         let problem = format!(
             "the header promises [{}, {}] numbers of {size} bytes, but only {} bytes follow",
             header.rows,
@@ -136,8 +136,7 @@ pub(super) fn decode<T: NpyNumber>(bytes: &[u8]) -> Parsed<Matrix<T>> {
             body.len()
         );
         return Err(ParseError::new(Position::Byte(header.body), problem, TRUNCATED));
-    }
-    let n = header.rows * header.cols;
+    };
     let mut data = Vec::with_capacity(n);
     for item in body.chunks_exact(size).take(n) {
         data.push(T::convert(header.number(item)).ok_or_else(|| does_not_fit::<T>(&header))?);

@@ -83,6 +83,8 @@ fn errors_say_what_is_supported() {
         ("'<i4'", "(1, 2, 3)", "not of one or two dimensions"),
         ("'<i4'", "()", "not of one or two dimensions"),
         ("'<i4'", "(18446744073709551615, 18446744073709551615)", "promises [18446744073709551615"),
+        // The product of these is 2^64, and so 0 in 64 bits.
+        ("'<i4'", "(4294967296, 4294967296)", "promises [4294967296, 4294967296]"),
         ("'<i4'", "(99999999999999999999,)", "not of one or two dimensions"),
         ("'<i4'", "(4611686018427387905,)", "only 8 bytes follow"),
     ] {
