@@ -4,6 +4,7 @@ use super::FmapError;
 use crate::Matrix;
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::{factor, solve};
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::{Accum, Mat, MatRef, Par};
 
@@ -34,4 +35,24 @@ pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<(Mat<f64>, Vec<f64>, M
     .map_err(|_| FmapError::NoConvergence { rows, cols })?;
     let s = s.column_vector().iter().copied().collect();
     Ok((u, s, v))
+}
+
+/// The solution of `gram X = right` for a positive definite `gram`, `[k, k]`; `None` where it is singular to working
+/// precision.
+pub(crate) fn solve_positive_definite(gram: &Matrix, right: &Matrix) -> Option<Matrix> {
+    let k = gram.rows();
+    let scratch = factor::cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default())
+        .or(solve::solve_in_place_scratch::<f64>(k, right.cols(), Par::Seq));
+    let mut buffer = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut buffer);
+    let mut lower = gram.as_faer().to_owned();
+    factor::cholesky_in_place(lower.as_mut(), Default::default(), Par::Seq, stack, Default::default())
+        .ok()?;
+    let pivots = || (0..k).map(|i| lower[(i, i)]);
+    if pivots().fold(f64::INFINITY, f64::min) <= 1e-6 * pivots().fold(0.0, f64::max) {
+        return None;
+    }
+    let mut solution = right.as_faer().to_owned();
+    solve::solve_in_place(lower.as_ref(), solution.as_mut(), Par::Seq, stack);
+    Some(Matrix::from_fn(k, right.cols(), |i, j| solution[(i, j)]))
 }

@@ -20,7 +20,7 @@ pub use least_squares::{LeastSquaresOptions, least_squares};
 pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
 pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
 
-pub(crate) use dense::{multiply, thin_svd};
+pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
 
 /// How a functional map is computed from descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

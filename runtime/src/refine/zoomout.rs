@@ -3,7 +3,7 @@
 use super::sampling::farthest_points;
 use super::{RefineError, Refined};
 use crate::Matrix;
-use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares};
+use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares, multiply, solve_positive_definite};
 use crate::point_map::search::nearest_rows;
 use crate::point_map::{PointMap, transport, transposed};
 use crate::spectral::Eigenbasis;
@@ -138,7 +138,15 @@ fn on_samples(
 }
 
 /// The `C`, `[k, k]`, that minimises `sum |C phi(x) - psi(x)|^2` over the rows of `phi` and `psi`, `[m, k]`.
+///
+/// Evenly spread samples leave the eigenvectors nearly orthogonal, so that the normal equations do; where they are not, the
+/// singular value decomposition takes over.
 fn least_squares_map(phi: &Matrix, psi: &Matrix) -> Result<Matrix, RefineError> {
+    let gram = multiply(phi.as_faer().transpose(), phi.as_faer());
+    let right = multiply(phi.as_faer().transpose(), psi.as_faer());
+    if let Some(solution) = solve_positive_definite(&gram, &right) {
+        return Ok(transposed(&solution));
+    }
     Ok(least_squares(&transposed(phi), &transposed(psi), &LeastSquaresOptions::default())?.0)
 }
 

@@ -1,7 +1,7 @@
 //! Leaves of the search: groups of targets with a centre, a local basis, and each point's place in it.
 
 use super::bisect::Partition;
-use super::kernels::LOCAL;
+use super::kernels::{Kernels, LANES, LOCAL};
 use crate::Matrix;
 use rayon::prelude::*;
 
@@ -9,10 +9,14 @@ use rayon::prelude::*;
 const ROUND_UP: f64 = 1.0 + 1e-6;
 /// A direction shorter than this share of the leaf's radius is rounding noise.
 const NEGLIGIBLE: f64 = 1e-7;
+/// Steps of subspace iteration: the first halves the points left to measure, the second takes off another third.
+const SUBSPACE_ITERATIONS: usize = 2;
+/// Coordinate of an unused slot, too far away to be near anything.
+const NOWHERE: f32 = 1e18;
 
-/// All leaves, field by field; coordinates are those of the targets times the common scale.
+/// All leaves; coordinates are those of the targets times the common scale.
 pub(super) struct Leaves {
-    /// Slots per leaf: the largest number of points, rounded up to a multiple of 8.
+    /// Slots per leaf: the largest number of points, rounded up to a multiple of `LANES`.
     pub(super) stride: usize,
     /// `[n_leaves, d]`.
     pub(super) centers: Matrix<f32>,
@@ -29,8 +33,9 @@ pub(super) struct LeafShape {
     pub(super) radius: f32,
     /// No point is farther from the plane through the centre along the basis.
     pub(super) remainder: f32,
-    /// The orthonormal basis, `[d, LOCAL]`; zero columns where the leaf has fewer directions.
-    pub(super) basis: Vec<f32>,
+    /// The orthonormal basis and, in the last column, the centre, `[d, LANES]`; zero columns where the leaf has fewer
+    /// directions.
+    pub(super) frame: Vec<f32>,
     /// The centre in the basis.
     pub(super) offset: [f32; LOCAL],
     /// The box around the points' coordinates.
@@ -44,15 +49,15 @@ pub(super) struct LeafShape {
 
 impl Leaves {
     /// Describes each group of `partition`; `points` are in the partition's order.
-    pub(super) fn new(points: &Matrix, partition: &Partition, scale: f64) -> Self {
+    pub(super) fn new(points: &Matrix, partition: &Partition, scale: f64, kernels: Kernels) -> Self {
         let largest = partition.ranges.iter().map(|range| range.len()).max().unwrap_or(0);
-        let stride = largest.next_multiple_of(8);
+        let stride = largest.next_multiple_of(LANES);
         let (centers, shapes): (Vec<Vec<f32>>, Vec<LeafShape>) = partition
             .ranges
             .par_iter()
             .map(|range| {
                 let rows: Vec<&[f64]> = range.clone().map(|i| points.row(i)).collect();
-                describe(&rows, scale, stride)
+                describe(&rows, scale, stride, kernels)
             })
             .unzip();
         let centers = Matrix::from_vec(shapes.len(), points.cols(), centers.concat());
@@ -60,30 +65,36 @@ impl Leaves {
     }
 }
 
-fn describe(rows: &[&[f64]], scale: f64, stride: usize) -> (Vec<f32>, LeafShape) {
+fn describe(rows: &[&[f64]], scale: f64, stride: usize, kernels: Kernels) -> (Vec<f32>, LeafShape) {
     let d = rows[0].len();
     let mut mean = vec![0.0; d];
-    for row in rows {
-        mean.iter_mut().zip(*row).for_each(|(m, x)| *m += x);
+    rows.iter().for_each(|row| kernels.add_scaled(&mut mean, scale / rows.len() as f64, row));
+    let center: Vec<f32> = mean.iter().map(|&m| m as f32).collect();
+    let exact_center: Vec<f64> = center.iter().map(|&c| f64::from(c)).collect();
+    let mut relative = Matrix::zeros(rows.len(), d);
+    for (i, row) in rows.iter().enumerate() {
+        kernels.add_scaled(relative.row_mut(i), scale, row);
+        kernels.add_scaled(relative.row_mut(i), -1.0, &exact_center);
     }
-    let center: Vec<f32> = mean.iter().map(|m| (m * (scale / rows.len() as f64)) as f32).collect();
-    let mut relative = Matrix::from_fn(rows.len(), d, |i, t| rows[i][t] * scale - f64::from(center[t]));
+    let norm = |row: &[f64]| kernels.dot(row, row).sqrt();
     let radius = (0..rows.len()).map(|i| norm(relative.row(i))).fold(0.0, f64::max);
-    let directions = local_directions(&relative, radius * NEGLIGIBLE);
+    let directions = local_directions(&relative, radius * NEGLIGIBLE, kernels);
 
-    let mut basis = vec![0.0; d * LOCAL];
+    let mut frame = vec![0.0; d * LANES];
     let mut offset = [0.0; LOCAL];
     let mut coordinates = vec![0.0; LOCAL * stride];
+    coordinates.chunks_exact_mut(stride).for_each(|slots| slots[rows.len()..].fill(NOWHERE));
     let (mut low, mut high) = ([0.0; LOCAL], [0.0; LOCAL]);
+    center.iter().enumerate().for_each(|(t, &c)| frame[t * LANES + LOCAL] = c);
     for (j, direction) in directions.iter().enumerate() {
-        let rounded: Vec<f32> = direction.iter().map(|&x| x as f32).collect();
-        let exact: Vec<f64> = rounded.iter().map(|&x| f64::from(x)).collect();
-        rounded.iter().enumerate().for_each(|(t, &x)| basis[t * LOCAL + j] = x);
-        offset[j] = center.iter().zip(&exact).map(|(&c, x)| f64::from(c) * x).sum::<f64>() as f32;
+        // The basis is what is left after rounding; coordinates and remainders are exact for that.
+        let exact: Vec<f64> = direction.iter().map(|&x| f64::from(x as f32)).collect();
+        exact.iter().enumerate().for_each(|(t, &x)| frame[t * LANES + j] = x as f32);
+        offset[j] = kernels.dot(&exact_center, &exact) as f32;
         (low[j], high[j]) = (f32::MAX, f32::MIN);
         for i in 0..rows.len() {
-            let coordinate = dot(relative.row(i), &exact);
-            relative.row_mut(i).iter_mut().zip(&exact).for_each(|(r, x)| *r -= coordinate * x);
+            let coordinate = kernels.dot(relative.row(i), &exact);
+            kernels.add_scaled(relative.row_mut(i), -coordinate, &exact);
             let coordinate = coordinate as f32;
             coordinates[j * stride + i] = coordinate;
             low[j] = low[j].min(coordinate);
@@ -94,13 +105,13 @@ fn describe(rows: &[&[f64]], scale: f64, stride: usize) -> (Vec<f32>, LeafShape)
     for (i, remainder) in remainders.iter_mut().enumerate().take(rows.len()) {
         *remainder = (norm(relative.row(i)) * ROUND_UP) as f32;
     }
-    let center_squared = center.iter().map(|&c| f64::from(c) * f64::from(c)).sum::<f64>();
+    let center_squared = kernels.dot(&exact_center, &exact_center);
     let shape = LeafShape {
         center_norm: center_squared.sqrt() as f32,
         center_squared: center_squared as f32,
         radius: (radius * ROUND_UP) as f32,
         remainder: remainders.iter().copied().fold(0.0, f32::max),
-        basis,
+        frame,
         offset,
         low,
         high,
@@ -113,63 +124,56 @@ fn describe(rows: &[&[f64]], scale: f64, stride: usize) -> (Vec<f32>, LeafShape)
 /// Up to `LOCAL` orthonormal directions that capture most of `relative`, `[m, d]`.
 ///
 /// Greedy: the farthest remaining point gives the next direction (pivoted Gram-Schmidt, which controls the largest
-/// remainder, the quantity the bounds depend on), and one pass of subspace iteration evens them out.
-fn local_directions(relative: &Matrix, negligible: f64) -> Vec<Vec<f64>> {
+/// remainder, the quantity the bounds depend on), and a little subspace iteration turns them to the principal axes.
+fn local_directions(relative: &Matrix, negligible: f64, kernels: Kernels) -> Vec<Vec<f64>> {
     let mut rest = relative.clone();
+    let mut norms: Vec<f64> =
+        (0..rest.rows()).map(|i| kernels.dot(rest.row(i), rest.row(i)).sqrt()).collect();
     let mut greedy: Vec<Vec<f64>> = Vec::new();
     while greedy.len() < LOCAL.min(relative.cols()) {
-        let norms: Vec<f64> = (0..rest.rows()).map(|i| norm(rest.row(i))).collect();
         let farthest = (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
         if norms[farthest] <= negligible {
             break;
         }
         let direction: Vec<f64> = rest.row(farthest).iter().map(|x| x / norms[farthest]).collect();
-        for i in 0..rest.rows() {
-            let along = dot(rest.row(i), &direction);
-            rest.row_mut(i).iter_mut().zip(&direction).for_each(|(r, x)| *r -= along * x);
+        for (i, norm) in norms.iter_mut().enumerate() {
+            let along = kernels.dot(rest.row(i), &direction);
+            kernels.add_scaled(rest.row_mut(i), -along, &direction);
+            *norm = kernels.dot(rest.row(i), rest.row(i)).sqrt();
         }
         greedy.push(direction);
     }
-    let iterated = greedy.iter().map(|direction| apply_covariance(relative, direction)).collect();
-    orthonormalized(iterated, negligible)
+    (0..SUBSPACE_ITERATIONS).fold(greedy, |directions, _| {
+        let images =
+            directions.iter().map(|direction| apply_covariance(relative, direction, kernels)).collect();
+        orthonormalized(images, kernels)
+    })
 }
 
 /// `X^T X v` for the rows `X`.
-fn apply_covariance(rows: &Matrix, vector: &[f64]) -> Vec<f64> {
+fn apply_covariance(rows: &Matrix, vector: &[f64], kernels: Kernels) -> Vec<f64> {
     let mut image = vec![0.0; vector.len()];
     for i in 0..rows.rows() {
-        let along = dot(rows.row(i), vector);
-        image.iter_mut().zip(rows.row(i)).for_each(|(y, x)| *y += along * x);
+        kernels.add_scaled(&mut image, kernels.dot(rows.row(i), vector), rows.row(i));
     }
     image
 }
 
 /// Modified Gram-Schmidt, twice over; vectors that vanish are dropped.
-fn orthonormalized(vectors: Vec<Vec<f64>>, negligible: f64) -> Vec<Vec<f64>> {
+fn orthonormalized(vectors: Vec<Vec<f64>>, kernels: Kernels) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut vector in vectors {
-        let original = norm(&vector);
-        if original <= negligible * negligible {
-            continue;
-        }
+        let original = kernels.dot(&vector, &vector).sqrt();
         for _ in 0..2 {
             for direction in &basis {
-                let along = dot(&vector, direction);
-                vector.iter_mut().zip(direction).for_each(|(v, x)| *v -= along * x);
+                let along = kernels.dot(&vector, direction);
+                kernels.add_scaled(&mut vector, -along, direction);
             }
         }
-        let length = norm(&vector);
+        let length = kernels.dot(&vector, &vector).sqrt();
         if length > NEGLIGIBLE * original {
             basis.push(vector.iter().map(|v| v / length).collect());
         }
     }
     basis
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-fn norm(a: &[f64]) -> f64 {
-    dot(a, a).sqrt()
 }

@@ -94,7 +94,7 @@ impl NearestRows {
         let partition = Partition::new(targets, leaf_size(n_targets), kernels);
         let points = targets.select_rows(&partition.order);
         let scale = unit_scale(&points);
-        let leaves = Leaves::new(&points, &partition, scale);
+        let leaves = Leaves::new(&points, &partition, scale, kernels);
         Ok(Self { partition, points, scale, leaves, kernels })
     }
 
@@ -120,7 +120,8 @@ pub fn nearest_rows(queries: &Matrix, targets: &Matrix) -> Result<Nearest, Searc
     NearestRows::new(targets)?.nearest(queries)
 }
 
-/// Points in a leaf: the cost of leaf centres falls with it, the cost of the leaves that survive grows.
+/// Points in a leaf, at most, and queries in a block: the cost of looking at all leaves falls with it, the cost of looking into those that
+/// are not excluded grows.
 fn leaf_size(n_targets: usize) -> usize {
     (((n_targets as f64).sqrt() / 3.0) as usize).clamp(24, 160)
 }

@@ -1,15 +1,12 @@
 //! The search itself: blocks of neighbouring queries against all leaves.
 
 use super::bisect::Partition;
-use super::kernels::{GROUP, LOCAL};
+use super::kernels::{GROUP, Kernels, LANES, LOCAL};
 use super::leaves::LeafShape;
 use super::{Nearest, NearestRows};
 use crate::Matrix;
-use faer::{Accum, Par};
 use rayon::prelude::*;
 
-/// Queries handled together: their products with the leaf centres are one matrix product.
-const BLOCK: usize = 64;
 /// Keeps the slack of a bound positive where squares underflow.
 const TINY: f32 = 1e-30;
 /// Loosens an `f32` square root or square enough to cover its rounding.
@@ -17,7 +14,7 @@ const ROUND_UP: f32 = 1.0 + 4e-6;
 
 /// For every row of `queries` the nearest target.
 pub(super) fn nearest(search: &NearestRows, queries: &Matrix) -> Nearest {
-    let partition = Partition::new(queries, BLOCK, search.kernels);
+    let partition = Partition::new(queries, super::leaf_size(search.points.rows()), search.kernels);
     let blocks: Vec<Vec<Best>> = partition
         .ranges
         .par_iter()
@@ -39,12 +36,16 @@ pub(super) fn nearest(search: &NearestRows, queries: &Matrix) -> Nearest {
 /// Buffers that outlive a block.
 #[derive(Default)]
 struct Scratch {
-    /// Inner products of leaf centres and queries, `[n_leaves, n_queries]`.
+    /// Inner products of the leaf centres with the block's centre, `[n_leaves]`.
     products: Vec<f32>,
+    /// Leaves that may hold the nearest point of some query, with a lower bound of their distance from the block's centre.
+    leaves: Vec<(f32, u32)>,
     /// Lower bounds for the points of a leaf, `[stride]`.
     bounds: Vec<f32>,
     /// Queries of the block that may find a nearer point in the current leaf.
     open: Vec<usize>,
+    /// Query, position and lower bound of points still to be measured.
+    pending: Vec<(u32, u32, f32)>,
 }
 
 /// The nearest target found so far.
@@ -69,23 +70,33 @@ impl Best {
     };
 }
 
-/// A query's place relative to one leaf.
+/// The place of a point, a query or the block's centre, relative to one leaf.
 struct Placed {
     /// Coordinates in the leaf's basis, relative to its centre.
     b: [f32; LOCAL],
     /// Distance from the leaf's plane.
     w: f32,
-    /// What rounding may have added to a lower bound.
+    /// What rounding may have added to a lower bound of a squared distance.
     slack: f32,
+}
+
+/// A point that is placed relative to leaves: scaled and rounded, with its norm and its square.
+#[derive(Clone, Copy)]
+struct Point<'a> {
+    entries: &'a [f32],
+    norm: f32,
+    squared_norm: f32,
 }
 
 struct Block<'a> {
     search: &'a NearestRows,
-    /// The queries, `[n_queries, d]`, as they are and scaled.
+    /// The queries, `[n_queries, d]`, as they are.
     exact: Vec<&'a [f64]>,
+    /// The queries scaled and, as last row, their mean.
     scaled: Matrix<f32>,
-    norm: Vec<f32>,
     squared_norm: Vec<f32>,
+    /// Distance of each query from the mean.
+    spread: Vec<f32>,
     best: Vec<Best>,
     /// Rounding error of a bound, relative to the square of the lengths that entered it.
     ///
@@ -96,66 +107,87 @@ struct Block<'a> {
 
 impl<'a> Block<'a> {
     fn new(search: &'a NearestRows, queries: &'a Matrix, rows: &[u32]) -> Self {
-        let d = queries.cols();
+        let (d, n, scale, kernels) = (queries.cols(), rows.len(), search.scale, search.kernels);
         let exact: Vec<&[f64]> = rows.iter().map(|&i| queries.row(i as usize)).collect();
-        let scaled = Matrix::from_fn(rows.len(), d, |q, t| (exact[q][t] * search.scale) as f32);
-        let squares = exact.iter().map(|q| search.kernels.dot(q, q) * search.scale * search.scale);
-        let squared_norm: Vec<f32> = squares.map(|square| square as f32).collect();
-        let norm = squared_norm.iter().map(|square| square.sqrt()).collect();
-        let tolerance = 16.0 * (d as f32 + 16.0) * f32::EPSILON / 2.0;
-        Self { search, scaled, norm, squared_norm, best: vec![Best::NONE; rows.len()], tolerance, exact }
-    }
-
-    fn run(&mut self, scratch: &mut Scratch) {
-        let Scratch { products, bounds, open } = scratch;
-        self.multiply_centers(products);
-        bounds.resize(self.search.leaves.stride, 0.0);
-        self.seed(products, bounds);
-        for leaf in 0..self.search.leaves.shapes.len() {
-            self.visit(leaf, &products[leaf * self.exact.len()..], bounds, open);
+        let mut mean = vec![0.0; d];
+        exact.iter().for_each(|query| kernels.add_scaled(&mut mean, scale / n as f64, query));
+        let mut entries: Vec<f32> = Vec::with_capacity((n + 1) * d);
+        exact.iter().for_each(|query| entries.extend(query.iter().map(|x| (x * scale) as f32)));
+        entries.extend(mean.iter().map(|&x| x as f32));
+        // Back in the queries' scale, which is exact, as the scale is a power of two.
+        let mean: Vec<f64> = entries[n * d..].iter().map(|&x| f64::from(x) / scale).collect();
+        let squared = |row: &[f64]| (kernels.dot(row, row) * scale * scale) as f32;
+        let spread =
+            |query: &&[f64]| (kernels.squared_distance(query, &mean).sqrt() * scale) as f32 * ROUND_UP;
+        Self {
+            search,
+            scaled: Matrix::from_vec(n + 1, d, entries),
+            squared_norm: exact.iter().copied().chain([&mean[..]]).map(squared).collect(),
+            spread: exact.iter().map(spread).collect(),
+            best: vec![Best::NONE; n],
+            tolerance: 16.0 * (d as f32 + 16.0) * f32::EPSILON / 2.0,
+            exact,
         }
     }
 
-    fn multiply_centers(&self, products: &mut Vec<f32>) {
-        let (n_leaves, n_queries) = (self.search.leaves.centers.rows(), self.exact.len());
-        products.resize(n_leaves * n_queries, 0.0);
-        faer::linalg::matmul::matmul(
-            faer::MatMut::from_row_major_slice_mut(products, n_leaves, n_queries),
-            Accum::Replace,
-            self.search.leaves.centers.as_faer(),
-            self.scaled.as_faer().transpose(),
-            1.0,
-            Par::Seq,
-        );
+    /// The search, compiled like the kernels for the instruction sets at hand.
+    fn run(&mut self, scratch: &mut Scratch) {
+        match self.search.kernels {
+            #[cfg(target_arch = "x86_64")]
+            Kernels::Avx2 => {
+                #[target_feature(enable = "avx2,fma")]
+                fn avx2(block: &mut Block, scratch: &mut Scratch) {
+                    block.search_all(scratch);
+                }
+                // SAFETY: the variant exists only where detection found AVX2 and FMA.
+                unsafe { avx2(self, scratch) }
+            }
+            Kernels::Portable => self.search_all(scratch),
+        }
     }
 
-    /// A first guess for every query: the most promising point of the leaf with the nearest centre, or what the query
-    /// before it found.
-    fn seed(&mut self, products: &[f32], bounds: &mut [f32]) {
-        let n_queries = self.exact.len();
-        let mut nearest = vec![(f32::INFINITY, 0); n_queries];
-        for (leaf, shape) in self.search.leaves.shapes.iter().enumerate() {
-            let products = &products[leaf * n_queries..][..n_queries];
-            for (slot, product) in nearest.iter_mut().zip(products) {
-                let distance = shape.center_squared - 2.0 * product;
-                if distance < slot.0 {
-                    *slot = (distance, leaf);
-                }
+    #[inline(always)]
+    fn search_all(&mut self, scratch: &mut Scratch) {
+        let leaves = &self.search.leaves;
+        scratch.products.resize(leaves.shapes.len(), 0.0);
+        scratch.bounds.resize(leaves.stride, 0.0);
+        let center = self.point(self.exact.len());
+        self.search.kernels.inner_products(leaves.centers.data(), center.entries, &mut scratch.products);
+        self.seed(scratch);
+        self.list_leaves(scratch);
+        for next in 0..scratch.leaves.len() {
+            let (distance, leaf) = scratch.leaves[next];
+            if next % 8 == 0 && distance > self.farthest_reach() {
+                break;
+            }
+            self.visit(distance, leaf as usize, scratch);
+        }
+        for (q, position, bound) in scratch.pending.drain(..) {
+            if !(bound > self.best[q as usize].squared_reach) {
+                self.try_point(q as usize, position as usize);
             }
         }
-        for q in 0..n_queries {
-            let leaf = nearest[q].1;
-            let shape = &self.search.leaves.shapes[leaf];
-            let coordinates = self.search.kernels.project(&shape.basis, [self.scaled.row(q); GROUP]);
-            let placed = self.place(q, shape, products[leaf * n_queries + q], coordinates[0]);
-            self.search.kernels.point_bounds(
-                &shape.coordinates,
-                &shape.remainders,
-                &placed.b,
-                placed.w,
-                bounds,
-            );
-            let range = &self.search.partition.ranges[leaf];
+    }
+
+    #[inline(always)]
+    fn point(&self, row: usize) -> Point<'_> {
+        let squared_norm = self.squared_norm[row];
+        Point { entries: self.scaled.row(row), norm: squared_norm.sqrt(), squared_norm }
+    }
+
+    /// A first guess for every query: the most promising point of the leaf nearest to the block, or what the query
+    /// before it found.
+    fn seed(&mut self, scratch: &mut Scratch) {
+        let shapes = &self.search.leaves.shapes;
+        let distance = |leaf: usize| shapes[leaf].center_squared - 2.0 * scratch.products[leaf];
+        let leaf =
+            (0..shapes.len()).fold(0, |low, leaf| if distance(leaf) < distance(low) { leaf } else { low });
+        let range = &self.search.partition.ranges[leaf];
+        for q in 0..self.exact.len() {
+            let frame = self.search.kernels.project_one(&shapes[leaf].frame, self.scaled.row(q));
+            let placed = self.place(self.point(q), &shapes[leaf], frame);
+            self.bound_points(&shapes[leaf], &placed, &mut scratch.bounds);
+            let bounds = &scratch.bounds;
             let lowest = (0..range.len()).fold(0, |low, i| if bounds[i] < bounds[low] { i } else { low });
             self.try_point(q, range.start + lowest);
             if q > 0 {
@@ -164,51 +196,103 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// Lets every query that may gain from `leaf` look at it; `products` are the centre's with the queries.
-    fn visit(&mut self, leaf: usize, products: &[f32], bounds: &mut [f32], open: &mut Vec<usize>) {
-        let shape = &self.search.leaves.shapes[leaf];
-        open.clear();
-        open.extend((0..self.exact.len()).filter(|&q| {
-            let reach = shape.radius + self.best[q].reach;
-            let distance = self.squared_norm[q] + shape.center_squared - 2.0 * products[q];
+    /// Lists the leaves near enough to the block's centre for some query, the nearest first.
+    #[inline(always)]
+    fn list_leaves(&self, scratch: &mut Scratch) {
+        let farthest = self.farthest_reach();
+        let center = self.point(self.exact.len());
+        scratch.leaves.clear();
+        for (leaf, (shape, product)) in self.search.leaves.shapes.iter().zip(&scratch.products).enumerate() {
+            let distance = center.squared_norm + shape.center_squared - 2.0 * product;
+            let reach = (shape.radius + farthest) * ROUND_UP;
             // Written so that a NaN from an overflow keeps the leaf.
-            !(distance - self.slack(q, shape) > reach * reach)
-        }));
+            if distance - self.slack(center, shape) > reach * reach {
+                continue;
+            }
+            let placed =
+                self.place(center, shape, self.search.kernels.project_one(&shape.frame, center.entries));
+            let bound = (box_bound(shape, &placed) - placed.slack).max(0.0).sqrt() / ROUND_UP;
+            if !(bound > farthest) {
+                scratch.leaves.push((bound, leaf as u32));
+            }
+        }
+        scratch.leaves.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+
+    /// How far from the block's centre a point can be that is the nearest of some query.
+    #[inline(always)]
+    fn farthest_reach(&self) -> f32 {
+        self.best
+            .iter()
+            .zip(&self.spread)
+            .map(|(best, spread)| (best.reach + spread) * ROUND_UP)
+            .fold(0.0, f32::max)
+    }
+
+    /// Lets every query that may gain from `leaf` look at it; no point of the leaf is nearer to the block's centre than
+    /// `distance`.
+    #[inline(always)]
+    fn visit(&mut self, distance: f32, leaf: usize, scratch: &mut Scratch) {
+        let shape = &self.search.leaves.shapes[leaf];
+        let open = &mut scratch.open;
+        open.clear();
+        open.extend(
+            (0..self.exact.len()).filter(|&q| !(distance > (self.best[q].reach + self.spread[q]) * ROUND_UP)),
+        );
         for group in open.chunks(GROUP) {
             let rows = std::array::from_fn(|i| self.scaled.row(group[i.min(group.len() - 1)]));
-            let coordinates = self.search.kernels.project(&shape.basis, rows);
-            for (&q, coordinates) in group.iter().zip(coordinates) {
-                let placed = self.place(q, shape, products[q], coordinates);
+            let frames = self.search.kernels.project(&shape.frame, rows);
+            for (&q, frame) in group.iter().zip(frames) {
+                let placed = self.place(self.point(q), shape, frame);
                 if !(box_bound(shape, &placed) - placed.slack > self.best[q].squared_reach) {
-                    self.scan(q, leaf, &placed, bounds);
+                    self.scan(q, leaf, &placed, &mut scratch.bounds, &mut scratch.pending);
                 }
             }
         }
     }
 
-    fn slack(&self, q: usize, shape: &LeafShape) -> f32 {
-        let length = self.norm[q] + shape.center_norm + shape.radius;
+    #[inline(always)]
+    fn slack(&self, point: Point, shape: &LeafShape) -> f32 {
+        let length = point.norm + shape.center_norm + shape.radius;
         self.tolerance * length * length + TINY
     }
 
-    fn place(&self, q: usize, shape: &LeafShape, product: f32, mut b: [f32; LOCAL]) -> Placed {
-        let mut within = 0.0;
-        for (b, offset) in b.iter_mut().zip(shape.offset) {
-            *b -= offset;
-            within += *b * *b;
-        }
-        let distance = self.squared_norm[q] + shape.center_squared - 2.0 * product;
-        Placed { b, w: (distance - within).max(0.0).sqrt(), slack: self.slack(q, shape) }
+    /// Places a point by its inner products with the columns of the leaf's frame.
+    #[inline(always)]
+    fn place(&self, point: Point, shape: &LeafShape, frame: [f32; LANES]) -> Placed {
+        let b: [f32; LOCAL] = std::array::from_fn(|j| frame[j] - shape.offset[j]);
+        let within: f32 = b.iter().map(|b| b * b).sum();
+        let distance = point.squared_norm + shape.center_squared - 2.0 * frame[LOCAL];
+        Placed { b, w: (distance - within).max(0.0).sqrt(), slack: self.slack(point, shape) }
     }
 
-    /// Measures the points of `leaf` that the bound does not exclude.
-    fn scan(&mut self, q: usize, leaf: usize, placed: &Placed, bounds: &mut [f32]) {
-        let shape = &self.search.leaves.shapes[leaf];
-        self.search.kernels.point_bounds(&shape.coordinates, &shape.remainders, &placed.b, placed.w, bounds);
-        let range = &self.search.partition.ranges[leaf];
-        for (position, &bound) in range.clone().zip(bounds.iter()) {
-            if !(bound - placed.slack > self.best[q].squared_reach) {
-                self.try_point(q, position);
+    #[inline(always)]
+    fn bound_points(&self, shape: &LeafShape, placed: &Placed, bounds: &mut [f32]) -> f32 {
+        self.search.kernels.point_bounds(&shape.coordinates, &shape.remainders, &placed.b, placed.w, bounds)
+    }
+
+    /// Measures the most promising point of `leaf` and notes the others that the bound does not exclude.
+    fn scan(
+        &mut self,
+        q: usize,
+        leaf: usize,
+        placed: &Placed,
+        bounds: &mut [f32],
+        pending: &mut Vec<(u32, u32, f32)>,
+    ) {
+        let lowest = self.bound_points(&self.search.leaves.shapes[leaf], placed, bounds);
+        if lowest - placed.slack > self.best[q].squared_reach {
+            return;
+        }
+        let range = self.search.partition.ranges[leaf].clone();
+        if let Some(first) = bounds[..range.len()].iter().position(|&bound| bound == lowest) {
+            self.try_point(q, range.start + first);
+        }
+        let limit = self.best[q].squared_reach;
+        for (position, &bound) in range.zip(bounds.iter()) {
+            let bound = bound - placed.slack;
+            if !(bound > limit) {
+                pending.push((q as u32, position as u32, bound));
             }
         }
     }
@@ -227,6 +311,7 @@ impl<'a> Block<'a> {
 }
 
 /// Lower bound of the squared distance to any point of the leaf, by the box of their coordinates.
+#[inline(always)]
 fn box_bound(shape: &LeafShape, placed: &Placed) -> f32 {
     let off = (placed.w - shape.remainder).max(0.0);
     let mut bound = off * off;
