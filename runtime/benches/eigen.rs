@@ -1,8 +1,10 @@
-//! Seconds of the Laplacian and of the eigenbasis over the number of vertices: `cargo bench -p fmnet-runtime --bench eigen`.
+//! Seconds of the Laplacian and of the eigenbasis over the number of vertices: `cargo bench -p fmnet-runtime
+//! --bench eigen`.
 //!
-//! Arguments after `--`: `--quick` leaves the meshes above 20K vertices out; `--export DIR` writes each mesh as `.off`, and the
-//! eigenvalues found as `.txt`, for `benches/peers/eigen.py` to time scipy on. Threads: `RAYON_NUM_THREADS`. Each wall time
-//! is the least of several runs; processor time is that of the same run, on Linux.
+//! Arguments after `--`: `--quick` leaves the meshes above 20K vertices out; `--export DIR` writes each mesh
+//! as `.off`, and the eigenvalues found as `.txt`, for `benches/peers/eigen.py` to time scipy on. Threads:
+//! `RAYON_NUM_THREADS`. Each wall time is the least of several runs; processor time is that of the same run,
+//! on Linux.
 
 use fmnet::Mesh;
 use fmnet::mesh::shapes;

@@ -15,7 +15,8 @@ pub struct Laplacian {
 }
 
 impl Laplacian {
-    /// The Laplacian of any triangle mesh: open, in several components, non-manifold or with degenerate faces.
+    /// The Laplacian of any triangle mesh: open, in several components, non-manifold or with degenerate
+    /// faces.
     ///
     /// Vertices that no triangle uses are components of their own, each with an eigenvalue 0; remove them
     /// first where they are not wanted in the eigenbasis.

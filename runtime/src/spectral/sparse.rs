@@ -52,7 +52,8 @@ impl SparseMatrix {
 
     /// Appends row `row`: `entries` merged by column, and the diagonal.
     fn push_row(&mut self, row: u32, entries: &mut [(u32, f64)]) {
-        // A stable sort adds the contributions to (i, j) and to (j, i) in one order: the matrix is exactly symmetric.
+        // A stable sort adds the contributions to (i, j) and to (j, i) in one order: the matrix is exactly
+        // symmetric.
         entries.sort_by_key(|&(column, _)| column);
         let start = self.indices.len();
         let mut diagonal_at = None;

@@ -14,9 +14,10 @@ const MIN_FLATNESS: f64 = 1e-6;
 ///
 /// `W_ij = -(cot alpha + cot beta) / 2` over the angles opposite to edge `ij` (one at a boundary, more at a
 /// non-manifold edge), and rows sum to zero (Pinkall and Polthier 1993). Symmetric, positive semi-definite,
-/// without unit: it does not change when the mesh is scaled. Always finite: a triangle flatter than a height of
-/// about a millionth of its length counts as one of that flatness, so a degenerate one ties its vertices together as its
-/// neighbours in the limit do; one with two equal indices, or with its three vertices at one point, has no part.
+/// without unit: it does not change when the mesh is scaled. Always finite: a triangle flatter than a height
+/// of about a millionth of its length counts as one of that flatness, so a degenerate one ties its vertices
+/// together as its neighbours in the limit do; one with two equal indices, or with its three vertices at one
+/// point, has no part.
 pub fn cotangent_stiffness(mesh: &Mesh) -> SparseMatrix {
     let mut entries = Vec::with_capacity(3 * mesh.n_faces());
     for (face, &[a, b, c]) in mesh.faces().iter().enumerate() {

@@ -9,11 +9,12 @@ use super::ritz::symmetric_eigen;
 use crate::Matrix;
 use faer::Mat;
 
-/// The `k` smallest eigenvalues for area 1, ascending, and eigenvectors `[n, k]`; those of the null space come first, as any
-/// basis of it.
+/// The `k` smallest eigenvalues for area 1, ascending, and eigenvectors `[n, k]`; those of the null space
+/// come first, as any basis of it.
 ///
-/// The matrix decomposed is the inverse of `D W D - sigma`, whose largest eigenvalues are wanted: `D W D` itself may
-/// have entries so large, at a degenerate face, that its smallest eigenvalues drown in their rounding.
+/// The matrix decomposed is the inverse of `D W D - sigma`, whose largest eigenvalues are wanted: `D W D`
+/// itself may have entries so large, at a degenerate face, that its smallest eigenvalues drown in their
+/// rounding.
 pub(super) fn dense_eigenpairs(pencil: &Pencil<'_>, k: usize) -> Result<(Vec<f64>, Matrix), EigenError> {
     let analysis = Analysis::new(pencil)?;
     let (sigma, factor) = positive_definite_factor(pencil, &analysis, k)?;

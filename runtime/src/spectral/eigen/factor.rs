@@ -15,8 +15,8 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::linalg::{SupernodalThreshold, SymbolicSupernodalParams};
 
-/// Supernodes merge up to so many columns where at most this share of the entries becomes a stored zero. Less than faer's
-/// default, as the solves are bound by reading the factor.
+/// Supernodes merge up to so many columns where at most this share of the entries becomes a stored zero. Less
+/// than faer's default, as the solves are bound by reading the factor.
 const RELAXATION: &[(usize, f64)] = &[(4, 0.3), (16, 0.15), (usize::MAX, 0.05)];
 
 /// The upper triangle of a symmetric matrix.
@@ -28,8 +28,8 @@ pub(super) struct Analysis {
 }
 
 impl Analysis {
-    /// Orders by approximate minimum degree. Supernodal: the factorisation is several times faster than the simplicial one, and the
-    /// solves run on dense blocks.
+    /// Orders by approximate minimum degree. Supernodal: the factorisation is several times faster than the
+    /// simplicial one, and the solves run on dense blocks.
     pub(super) fn new(pencil: &Pencil<'_>) -> Result<Self, EigenError> {
         let matrix = pencil.shifted(0.0);
         let params = CholeskySymbolicParams {
@@ -81,8 +81,8 @@ impl Analysis {
         usable.then_some(Cholesky { analysis: self, values })
     }
 
-    /// Number of negative eigenvalues of a nonsingular `M`, by Sylvester's law of inertia from `M = L D L^T`. `None` where a
-    /// pivot vanishes, as none is exchanged.
+    /// Number of negative eigenvalues of a nonsingular `M`, by Sylvester's law of inertia from `M = L D L^T`.
+    /// `None` where a pivot vanishes, as none is exchanged.
     pub(super) fn negative_eigenvalues(&self, matrix: &Upper) -> Option<usize> {
         let mut values = vec![0.0; self.symbolic.len_val()];
         let scratch = self.symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
@@ -134,8 +134,8 @@ impl Cholesky<'_> {
             return factor.solve(panel);
         }
         let (mut left, mut right) = rayon::join(
-            || panel.iter().map(|row| half::<0>(row)).collect::<Vec<_>>(),
-            || panel.iter().map(|row| half::<1>(row)).collect::<Vec<_>>(),
+            || panel.iter().map(half::<0>).collect::<Vec<_>>(),
+            || panel.iter().map(half::<1>).collect::<Vec<_>>(),
         );
         rayon::join(|| factor.solve(&mut left), || factor.solve(&mut right));
         for (row, (l, r)) in panel.iter_mut().zip(left.iter().zip(&right)) {

@@ -1,10 +1,11 @@
 //! The operator that Lanczos works on: a Chebyshev polynomial of the inverted, shifted Laplacian.
 //!
-//! With `S = (D W D - sigma)^-1`, `D = A^-1/2`, an eigenvalue `lambda` becomes `theta = 1 / (lambda - sigma)`. The
-//! polynomial maps `theta` in `[0, theta_cut]` into `[-1, 1]` and grows fast beyond, so wanted eigenvalues stand out
-//! more than in `S` itself: a subspace two thirds the size reaches the same accuracy, and orthogonalising that subspace is
-//! what costs. It has a root at `theta = 0`, which keeps the highest frequencies out of the subspace
-//! (Zhou, Saad, Tiago and Chelikowsky 2006 filter with `W` itself; on a mesh `S` needs a far lower degree).
+//! With `S = (D W D - sigma)^-1`, `D = A^-1/2`, an eigenvalue `lambda` becomes `theta = 1 / (lambda -
+//! sigma)`. The polynomial maps `theta` in `[0, theta_cut]` into `[-1, 1]` and grows fast beyond, so wanted
+//! eigenvalues stand out more than in `S` itself: a subspace two thirds the size reaches the same accuracy,
+//! and orthogonalising that subspace is what costs. It has a root at `theta = 0`, which keeps the highest
+//! frequencies out of the subspace (Zhou, Saad, Tiago and Chelikowsky 2006 filter with `W` itself; on a mesh
+//! `S` needs a far lower degree).
 
 use super::factor::Cholesky;
 use super::panel::{Panel, zip_rows};
@@ -34,7 +35,8 @@ impl<'a> Filter<'a> {
     /// Solves needed to apply the filter to one vector.
     pub(super) const SOLVES: usize = DEGREE as usize;
 
-    /// The filter applied to the columns of `panel`, by the three-term recurrence of the Chebyshev polynomials.
+    /// The filter applied to the columns of `panel`, by the three-term recurrence of the Chebyshev
+    /// polynomials.
     pub(super) fn apply(&self, panel: &Panel) -> Panel {
         let mut before = panel.clone();
         let mut current = self.linear(panel);

@@ -10,8 +10,8 @@ use super::{EigenError, EigenOptions};
 use crate::Matrix;
 use std::cmp::Ordering;
 
-/// The shift is this share of Weyl's estimate of the last eigenvalue: enough to make the factor well conditioned, too
-/// little to bring the wanted eigenvalues together.
+/// The shift is this share of Weyl's estimate of the last eigenvalue: enough to make the factor well
+/// conditioned, too little to bring the wanted eigenvalues together.
 const RELATIVE_SHIFT: f64 = 0.1;
 /// Eigenvalues up to this multiple of Weyl's estimate are amplified.
 const RELATIVE_CUT: f64 = 1.6;
@@ -66,7 +66,8 @@ pub(super) fn iterate(pencil: &Pencil<'_>, k: usize, options: &EigenOptions) -> 
     Err(EigenError::Factorization { reason: "the eigenvalues are far above those of a surface".into() })
 }
 
-/// The shift `sigma < 0` and the factor of `D W D - sigma`. Where rounding makes that indefinite, a larger shift is taken.
+/// The shift `sigma < 0` and the factor of `D W D - sigma`. Where rounding makes that indefinite, a larger
+/// shift is taken.
 pub(super) fn positive_definite_factor<'a>(
     pencil: &Pencil<'_>,
     analysis: &'a Analysis,
@@ -159,8 +160,8 @@ impl Search<'_> {
         Lanczos::new(filter, space, components.len(), self.pencil.n(), capacity, self.options.seed)
     }
 
-    /// Whether as many eigenvalues as were found lie below a number in the last gap between them; `None` where that is
-    /// not asked for or cannot be decided.
+    /// Whether as many eigenvalues as were found lie below a number in the last gap between them; `None`
+    /// where that is not asked for or cannot be decided.
     fn check_complete(&self, filter: &Filter<'_>, ritz: &RitzPairs) -> Option<bool> {
         if !self.options.verify {
             return None;
@@ -204,10 +205,11 @@ impl Search<'_> {
     }
 }
 
-/// How many of the wanted eigenvalues come before the last clear gap in the spectrum, and a number in that gap.
+/// How many of the wanted eigenvalues come before the last clear gap in the spectrum, and a number in that
+/// gap.
 ///
-/// The gap after the last wanted one counts if the pair beyond it is known well enough. Where a multiple eigenvalue is
-/// cut off there, the gap is the one before it.
+/// The gap after the last wanted one counts if the pair beyond it is known well enough. Where a multiple
+/// eigenvalue is cut off there, the gap is the one before it.
 fn last_gap(filter: &Filter<'_>, ritz: &RitzPairs, wanted: usize) -> Option<(usize, f64)> {
     let beyond_known = wanted < ritz.values.len() && ritz.residual(wanted) < LEAST_ACCURACY_BEYOND;
     let last = if beyond_known { wanted } else { wanted - 1 };

@@ -8,7 +8,8 @@ use faer::{Mat, MatRef};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// A Krylov subspace of the filtered operator `F`: `F V = V T + Q B E^T`, with `E` the last `BLOCK` unit vectors.
+/// A Krylov subspace of the filtered operator `F`: `F V = V T + Q B E^T`, with `E` the last `BLOCK` unit
+/// vectors.
 pub(super) struct Lanczos<'a> {
     filter: &'a Filter<'a>,
     /// Null vectors, then `V`.
@@ -127,11 +128,12 @@ impl<'a> Lanczos<'a> {
         self.coupling = [[0.0; BLOCK]; BLOCK];
     }
 
-    /// Calls `write` with rows of the first `count` Ritz vectors, chunk by chunk, and the first row of each chunk.
+    /// Calls `write` with rows of the first `count` Ritz vectors, chunk by chunk, and the first row of each
+    /// chunk.
     ///
-    /// Each vector is `F v / value` for the Ritz vector `v`, which needs no product with `F` but the coupling:
-    /// it has the part of the next block that `v` lacks, so that noise at high frequency, which
-    /// `F` suppresses, is not seen when `W` multiplies it (Nour-Omid, Parlett, Ericsson and Jensen 1987).
+    /// Each vector is `F v / value` for the Ritz vector `v`, which needs no product with `F` but the
+    /// coupling: it has the part of the next block that `v` lacks, so that noise at high frequency, which `F`
+    /// suppresses, is not seen when `W` multiplies it (Nour-Omid, Parlett, Ericsson and Jensen 1987).
     pub(super) fn ritz_vectors(&self, ritz: &RitzPairs, count: usize, write: impl Fn(usize, &[f64]) + Sync) {
         let y = ritz.vectors.as_ref().subcols(0, count);
         let z = Mat::from_fn(BLOCK, count, |i, j| ritz.outside[(i, j)] / ritz.values[j]);

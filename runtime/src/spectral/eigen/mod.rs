@@ -1,9 +1,10 @@
 //! The smallest eigenpairs of a Laplacian.
 //!
-//! Method: block Lanczos with thick restart on a Chebyshev polynomial of the inverse of `W - sigma A`, by a sparse
-//! Cholesky factorisation; `sigma < 0` comes from Weyl's law, so that the matrix is definite. The null space is known (functions
-//! constant on each component) and kept out. At the end the number of eigenvalues below the last one found is
-//! counted by an `L D L^T` factorisation, so that none is missed. Small meshes take a dense factorisation.
+//! Method: block Lanczos with thick restart on a Chebyshev polynomial of the inverse of `W - sigma A`, by a
+//! sparse Cholesky factorisation; `sigma < 0` comes from Weyl's law, so that the matrix is definite. The null
+//! space is known (functions constant on each component) and kept out. At the end the number of eigenvalues
+//! below the last one found is counted by an `L D L^T` factorisation, so that none is missed. Small meshes
+//! take a dense factorisation.
 
 mod components;
 mod dense;
@@ -39,15 +40,16 @@ const MANY: usize = 6;
 /// Options of [`eigenbasis`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct EigenOptions {
-    /// Relative residual at which a pair has converged, measured on the inverted operator. From 1e-13 to 1e-2;
-    /// default 1e-10. Eigenvalues are accurate to about its square.
+    /// Relative residual at which a pair has converged, measured on the inverted operator. From 1e-13 to
+    /// 1e-2; default 1e-10. Eigenvalues are accurate to about its square.
     pub tolerance: f64,
-    /// Dimension of the subspace at which the iteration restarts. Memory is `8 n` bytes for each. Default: about `2.3 k + 128`, with which most
-    /// meshes need no restart; less than `k + 32` counts as that.
+    /// Dimension of the subspace at which the iteration restarts. Memory is `8 n` bytes for each. Default:
+    /// about `2.3 k + 128`, with which most meshes need no restart; less than `k + 32` counts as that.
     pub subspace: Option<usize>,
     /// Restarts until the solver gives up. Default 50.
     pub max_restarts: usize,
-    /// Count the eigenvalues by another factorisation, to be sure that none is missed. Default true; costs some 5 % of the time.
+    /// Count the eigenvalues by another factorisation, to be sure that none is missed. Default true; costs
+    /// some 5 % of the time.
     pub verify: bool,
     /// Seed of the random start. Changes the result by rounding only. Default 0.
     pub seed: u64,
@@ -62,8 +64,8 @@ impl Default for EigenOptions {
 /// How [`eigenbasis`] came to its result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EigenInfo {
-    /// `|W phi - lambda A phi| / ((lambda + s) |A phi|)` of each pair, in Euclidean norms, `[k]`. `s` is about a tenth of
-    /// the last eigenvalue, as the zeros have no scale of their own.
+    /// `|W phi - lambda A phi| / ((lambda + s) |A phi|)` of each pair, in Euclidean norms, `[k]`. `s` is
+    /// about a tenth of the last eigenvalue, as the zeros have no scale of their own.
     pub residuals: Vec<f64>,
     /// Largest of `residuals`.
     pub max_residual: f64,
@@ -79,7 +81,8 @@ pub struct EigenInfo {
     pub subspace: usize,
     /// Stored entries of the Cholesky factor.
     pub factor_entries: usize,
-    /// Whether the count of eigenvalues says that none is missing; `None` where it was not made or not conclusive.
+    /// Whether the count of eigenvalues says that none is missing; `None` where it was not made or not
+    /// conclusive.
     pub complete: Option<bool>,
 }
 
@@ -143,7 +146,8 @@ pub enum EigenError {
     DenseSolver,
     /// The iteration gave up.
     #[error(
-        "{converged} of {k} eigenpairs converged in {restarts} restarts of a subspace of {subspace} (worst residual \
+        "{converged} of {k} eigenpairs converged in {restarts} restarts of a subspace of {subspace} \
+         (worst residual \
          {worst:.1e}): allow a larger subspace or tolerance, or ask for fewer pairs"
     )]
     NotConverged {
@@ -164,18 +168,19 @@ pub enum EigenError {
 
 /// The `k` smallest eigenpairs of `W phi = lambda A phi`, and how they were found.
 ///
-/// Eigenvalues ascend; there is one exact 0 for each component, whose eigenvector is constant on that component and 0
-/// elsewhere, larger components first. `Phi^T A Phi = I` to 1e-10. Multiple eigenvalues come with
-/// their multiplicity, with some basis of their eigenspace.
+/// Eigenvalues ascend; there is one exact 0 for each component, whose eigenvector is constant on that
+/// component and 0 elsewhere, larger components first. `Phi^T A Phi = I` to 1e-10. Multiple eigenvalues come
+/// with their multiplicity, with some basis of their eigenspace.
 ///
 /// Signs: `sum_i A_i phi_i^3 > 0`; where that sum is nil, the entry of largest magnitude is positive, the one
 /// of lowest index among equal ones.
 ///
-/// The same input gives the same bytes for any number of threads; a scaled mesh gives eigenvectors that differ by the scale and
-/// rounding only.
+/// The same input gives the same bytes for any number of threads; a scaled mesh gives eigenvectors that
+/// differ by the scale and rounding only.
 ///
 /// # Errors
-/// If the mesh has no area, `k` is 0 or too large for the mesh, or the iteration does not converge; see [`EigenError`].
+/// If the mesh has no area, `k` is 0 or too large for the mesh, or the iteration does not converge; see
+/// [`EigenError`].
 pub fn eigenbasis(
     laplacian: &Laplacian,
     k: usize,

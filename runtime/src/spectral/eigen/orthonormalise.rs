@@ -6,14 +6,16 @@ use rand_chacha::ChaCha8Rng;
 
 /// Least share of a vector that must remain after orthogonalisation for its direction to mean anything.
 const RANK_TOLERANCE: f64 = 1e-10;
-/// Share below which rounding left too much of the subspace in the vector, which is then orthogonalised again.
+/// Share below which rounding left too much of the subspace in the vector, which is then orthogonalised
+/// again.
 const CANCELLATION: f64 = 1e-3;
 
-/// Turns `panel = U`, already orthogonal to the first `len` columns of `space`, into an orthonormal `Q` with `U = Q R`, and
-/// returns `R`.
+/// Turns `panel = U`, already orthogonal to the first `len` columns of `space`, into an orthonormal `Q` with
+/// `U = Q R`, and returns `R`.
 ///
-/// `norms` are those of the columns before they were made orthogonal to the space. A column that all but vanished is
-/// replaced by a random one, with zeros in its row of `R`: the span of `U` stays within that of `Q`.
+/// `norms` are those of the columns before they were made orthogonal to the space. A column that all but
+/// vanished is replaced by a random one, with zeros in its row of `R`: the span of `U` stays within that of
+/// `Q`.
 pub(super) fn orthonormalise(
     panel: &mut Panel,
     norms: &[f64; BLOCK],
@@ -57,7 +59,8 @@ fn project_out(panel: &mut Panel, space: &TallMatrix, len: usize) {
     space.subtract(0..len, &coefficients, panel);
 }
 
-/// Upper `R` with `G = R^T R`; `None` where a column is numerically dependent on those before it or all but vanished.
+/// Upper `R` with `G = R^T R`; `None` where a column is numerically dependent on those before it or all but
+/// vanished.
 fn cholesky_upper(g: &Square, norms: &[f64; BLOCK]) -> Option<Square> {
     let mut r = [[0.0; BLOCK]; BLOCK];
     for j in 0..BLOCK {
@@ -163,9 +166,9 @@ mod tests {
         let mut q = original.clone();
         let r = orthonormalise(&mut q, &norms, &space, 0, &mut random);
         let products = gram(&q);
-        for i in 0..BLOCK {
-            for j in 0..BLOCK {
-                assert!((products[i][j] - f64::from(u8::from(i == j))).abs() < 1e-14);
+        for (i, row) in products.iter().enumerate() {
+            for (j, product) in row.iter().enumerate() {
+                assert!((product - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }
         for (u, q) in original.iter().zip(&q) {

@@ -1,7 +1,7 @@
 //! Tall matrices `[n, m]` in row-major storage, and their products with narrow panels.
 //!
-//! Every product splits the rows in chunks of fixed size; sums over rows add the chunks in order. The result is the
-//! same bytes for any number of threads.
+//! Every product splits the rows in chunks of fixed size; sums over rows add the chunks in order. The result
+//! is the same bytes for any number of threads.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -89,7 +89,8 @@ impl TallMatrix {
         });
     }
 
-    /// Calls `write` with the rows of `V Y + U Z`, `[rows, columns of Y]`, chunk by chunk, and the first row of each chunk.
+    /// Calls `write` with the rows of `V Y + U Z`, `[rows, columns of Y]`, chunk by chunk, and the first row
+    /// of each chunk.
     pub(super) fn combine(
         &self,
         columns: Range<usize>,

@@ -6,7 +6,8 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
 use faer::{Mat, MatRef, Par};
 
-/// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors as columns; `None` where the iteration fails.
+/// Eigenvalues of a symmetric matrix, ascending, and its eigenvectors as columns; `None` where the iteration
+/// fails.
 pub(super) fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<(Vec<f64>, Mat<f64>)> {
     let n = a.nrows();
     let mut values = Diag::<f64>::zeros(n);

@@ -21,7 +21,8 @@ fn orthonormality_error(basis: &Eigenbasis) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Linear elements of area `h^2` have a relative error of about `lambda h^2 / 12` in a smooth eigenvalue `lambda`.
+/// Linear elements of area `h^2` have a relative error of about `lambda h^2 / 12` in a smooth eigenvalue
+/// `lambda`.
 fn discretisation_error(mesh: &Mesh, eigenvalue: f64) -> f64 {
     1e-9 + 0.15 * eigenvalue.powi(2) * mesh.area() / mesh.n_vertices() as f64
 }
@@ -62,7 +63,8 @@ fn rectangle_has_the_neumann_spectrum() {
 #[test]
 fn every_mesh_of_the_zoo_has_an_orthonormal_basis() {
     for (name, mesh) in zoo() {
-        // Rounding of an eigenvector is multiplied by the largest entries of W, which belong to degenerate faces.
+        // Rounding of an eigenvector is multiplied by the largest entries of W, which belong to degenerate
+        // faces.
         let largest = Laplacian::new(&mesh).stiffness.diagonal().into_iter().fold(0.0, f64::max);
         let bound = 1e-9 + 1e-10 * largest;
         for k in [1, 7, 60, 200, mesh.n_vertices()].into_iter().filter(|&k| k <= mesh.n_vertices().min(700)) {

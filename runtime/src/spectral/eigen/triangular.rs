@@ -1,7 +1,8 @@
 //! Triangular solves with a supernodal Cholesky factor for several right-hand sides at once.
 //!
-//! The right-hand sides are interleaved by rows, so that one entry of the factor meets all of them in one vector
-//! register. Each right-hand side sees the same operations in the same order whatever the number `W` beside it.
+//! The right-hand sides are interleaved by rows, so that one entry of the factor meets all of them in one
+//! vector register. Each right-hand side sees the same operations in the same order whatever the number `W`
+//! beside it.
 
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
@@ -159,8 +160,8 @@ impl Supernode<'_> {
         }
     }
 
-    /// Subtracts from `T` of the own unknowns the part of the rows below. Even and odd rows are summed apart, so
-    /// that the sums do not wait for each other.
+    /// Subtracts from `T` of the own unknowns the part of the rows below. Even and odd rows are summed apart,
+    /// so that the sums do not wait for each other.
     #[inline(always)]
     fn gather<const W: usize, const T: usize, const FMA: bool>(
         &self,

@@ -9,8 +9,8 @@ const ROWS_PER_TASK: usize = 1024;
 /// Relative difference below which two numbers are a tie in the choice of a sign.
 const TIE: f64 = 1e-6;
 
-/// Writes the functions that are constant on one component to the first columns of `eigenvectors`, one of unit norm for
-/// each of the `count` largest components.
+/// Writes the functions that are constant on one component to the first columns of `eigenvectors`, one of
+/// unit norm for each of the `count` largest components.
 pub(super) fn write_null_vectors(pencil: &Pencil<'_>, count: usize, eigenvectors: &mut Matrix) {
     for (i, &component) in pencil.components.of_vertex.iter().enumerate() {
         let row = eigenvectors.row_mut(i);
@@ -21,7 +21,8 @@ pub(super) fn write_null_vectors(pencil: &Pencil<'_>, count: usize, eigenvectors
     }
 }
 
-/// Sums over the rows of what `add` accumulates for each row, `[q]`, in an order that is the same for any number of threads.
+/// Sums over the rows of what `add` accumulates for each row, `[q]`, in an order that is the same for any
+/// number of threads.
 fn sum_rows(n: usize, q: usize, add: impl Fn(usize, &mut [f64]) + Sync) -> Vec<f64> {
     let parts: Vec<Vec<f64>> = (0..n.div_ceil(ROWS_PER_TASK))
         .into_par_iter()
