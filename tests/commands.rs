@@ -110,7 +110,8 @@ fn the_number_of_threads_does_not_change_a_byte() {
     work.mesh("b.off", &bumpy_sphere(4, 2));
     let files = |threads: &str| {
         let (map, c) = (format!("m{threads}.csv"), format!("c{threads}.npy"));
-        let arguments = ["match", "a.off", "b.off", "--threads", threads, "-o", &map, "--save-functional-map", &c];
+        let arguments =
+            ["match", "a.off", "b.off", "--threads", threads, "-o", &map, "--save-functional-map", &c];
         work.succeed(&[&arguments[..], &SHOT, &["--refine", "zoomout"]].concat());
         (std::fs::read(work.path(&map)).unwrap(), std::fs::read(work.path(&c)).unwrap())
     };
@@ -124,7 +125,10 @@ fn features_describe_the_mesh() {
     work.mesh("a.ply", &mesh);
     work.succeed(&[&["features", "a.ply", "--out", "f"][..], &SHOT].concat());
     let file = |name: &str| work.path("f").join(name);
-    let (mass, eigenvalues) = (read_vector::<f64>(&file("mass.npy")).unwrap(), read_vector::<f64>(&file("eigenvalues.npy")).unwrap());
+    let (mass, eigenvalues) = (
+        read_vector::<f64>(&file("mass.npy")).unwrap(),
+        read_vector::<f64>(&file("eigenvalues.npy")).unwrap(),
+    );
     assert!((mass.iter().sum::<f64>() / mesh.area() - 1.0).abs() < 1e-6);
     assert!(eigenvalues[0].abs() < 1e-9 && eigenvalues.is_sorted());
     let vectors: Matrix = read_matrix(&file("eigenvectors.npy")).unwrap();
@@ -144,7 +148,9 @@ fn a_decimated_pair_is_upscaled() {
     work.succeed(&[&arguments[..], &SHOT].concat());
     let map = targets(&work.path("m.npy"));
     let scale = mesh.scale();
-    let error = |(s, &t): (usize, &u32)| fmnet::mesh::vec3::distance(mesh.vertices()[s], copy.vertices()[t as usize]) / scale;
+    let error = |(s, &t): (usize, &u32)| {
+        fmnet::mesh::vec3::distance(mesh.vertices()[s], copy.vertices()[t as usize]) / scale
+    };
     let mean = map.iter().enumerate().map(error).sum::<f64>() / map.len() as f64;
     assert!(mean < 0.02, "mean error {mean}");
 }
@@ -154,7 +160,11 @@ fn a_batch_resumes_and_one_failure_does_not_stop_the_rest() {
     let work = Workplace::new();
     work.mesh("a.off", &bumpy_sphere(3, 1));
     work.mesh("b.off", &bumpy_sphere(3, 2));
-    std::fs::write(work.path("pairs.txt"), "# two good, one bad\na.off b.off\na.off missing.off\nb.off a.off\n").unwrap();
+    std::fs::write(
+        work.path("pairs.txt"),
+        "# two good, one bad\na.off b.off\na.off missing.off\nb.off a.off\n",
+    )
+    .unwrap();
     let arguments = [&["batch", "pairs.txt", "--out", "maps", "--json"][..], &SHOT].concat();
     let message = work.fail(&arguments, 2);
     assert!(message.contains("missing.off") && message.contains("1 of 3 pairs failed"), "{message}");
@@ -173,9 +183,20 @@ fn transfer_and_evaluation_follow_the_map() {
     let identity: String = (0..mesh.n_vertices()).map(|i| format!("{i}\n")).collect();
     std::fs::write(work.path("id.txt"), identity).unwrap();
     std::fs::write(work.path("marks.txt"), "5\n17\n").unwrap();
-    work.succeed(&["transfer", "a.off", "b.off", "--map", "id.txt", "--values", "marks.txt", "-o", "moved.txt"]);
+    work.succeed(&[
+        "transfer",
+        "a.off",
+        "b.off",
+        "--map",
+        "id.txt",
+        "--values",
+        "marks.txt",
+        "-o",
+        "moved.txt",
+    ]);
     assert_eq!(std::fs::read_to_string(work.path("moved.txt")).unwrap(), "5\n17\n");
-    let arguments = ["evaluate", "id.txt", "--source", "a.off", "--target", "b.off", "--ground-truth", "identity"];
+    let arguments =
+        ["evaluate", "id.txt", "--source", "a.off", "--target", "b.off", "--ground-truth", "identity"];
     let text = work.succeed(&[&arguments[..], &["-o", "curve.csv", "-o", "curve.svg", "--json"]].concat());
     let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(summary["maps"][0]["summary"]["exact"], 1.0);
@@ -211,7 +232,8 @@ fn inspect_tells_what_is_wrong() {
     let work = Workplace::new();
     for (name, mesh) in fmnet::mesh::shapes::zoo() {
         work.mesh("z.ply", &mesh);
-        let report: serde_json::Value = serde_json::from_str(&work.succeed(&["inspect", "z.ply", "--json"])).unwrap();
+        let report: serde_json::Value =
+            serde_json::from_str(&work.succeed(&["inspect", "z.ply", "--json"])).unwrap();
         assert_eq!(report["report"]["n_vertices"], mesh.n_vertices(), "{name}");
     }
 }

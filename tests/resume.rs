@@ -44,7 +44,12 @@ fn losses(config: &TrainConfig, stop_after: u64) -> Vec<(u64, f64)> {
 fn a_stopped_run_goes_on_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
-    let options = DatasetOptions { species: vec![Species::Child], per_species: 4, validation: 0.5, ..Default::default() };
+    let options = DatasetOptions {
+        species: vec![Species::Child],
+        per_species: 4,
+        validation: 0.5,
+        ..Default::default()
+    };
     write_dataset(&data, &options, &|_, _| {}).unwrap();
     let whole = losses(&config(&data, &folder.path().join("whole")), u64::MAX);
     assert_eq!(whole.iter().map(|l| l.0).collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6]);
@@ -56,7 +61,8 @@ fn a_stopped_run_goes_on_exactly() {
 
     // As after a kill: the metrics know of a step that the checkpoint does not.
     let last = stopped.out.join(LAST);
-    let weights = |out: &Path| fmnet_trainer::checkpoint::Checkpoint::read(&out.join(LAST)).unwrap().parameters;
+    let weights =
+        |out: &Path| fmnet_trainer::checkpoint::Checkpoint::read(&out.join(LAST)).unwrap().parameters;
     assert_eq!(weights(&stopped.out), weights(&folder.path().join("whole")));
     let metrics = std::fs::read_to_string(stopped.out.join(METRICS)).unwrap();
     assert_eq!(metrics.matches("\"event\":\"step\"").count(), 6, "{metrics}");

@@ -19,7 +19,9 @@ use crate::point_map::{PointMap, recover};
 use crate::refine::{IcpOptions, ZoomOutOptions, icp, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
-use crate::upscale::{AdmmInfo, AdmmOptions, delta_coefficients, l21_functional_map, least_squares_functional_map};
+use crate::upscale::{
+    AdmmInfo, AdmmOptions, delta_coefficients, l21_functional_map, least_squares_functional_map,
+};
 use crate::{Matrix, Mesh};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -143,9 +145,11 @@ impl Matcher {
         let network = match (options.descriptor, &options.model) {
             (DescriptorKind::Shot, _) => None,
             (_, ModelSource::File(path)) => Some(DescriptorNetwork::load(path, options.backend)?),
-            (_, ModelSource::Embedded) => {
-                Some(DescriptorNetwork::from_bytes(Path::new("embedded model"), EMBEDDED_MODEL, options.backend)?)
-            }
+            (_, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
+                Path::new("embedded model"),
+                EMBEDDED_MODEL,
+                options.backend,
+            )?),
         };
         let mut shape_options = network.as_ref().map(|n| n.metadata().shape_options()).unwrap_or_default();
         let model_k = shape_options.k;
@@ -194,8 +198,11 @@ impl Matcher {
             let descriptors = shape.shot.clone();
             return Ok(DescribedShape { shape, descriptors, key });
         };
-        let network_key = CacheKey::of(&[key.as_bytes(), network.fingerprint(), network.backend().to_string().as_bytes()]);
-        if let Some(descriptors) = cache.and_then(|cache| cached_matrix(cache, "descriptors", network_key, observer)) {
+        let network_key =
+            CacheKey::of(&[key.as_bytes(), network.fingerprint(), network.backend().to_string().as_bytes()]);
+        if let Some(descriptors) =
+            cache.and_then(|cache| cached_matrix(cache, "descriptors", network_key, observer))
+        {
             return Ok(DescribedShape { shape, descriptors, key });
         }
         let descriptors = timed(observer, name, "network", || network.descriptors(&shape.shot))?;
@@ -221,9 +228,11 @@ impl Matcher {
         observer: Observer,
     ) -> Result<Match, Error> {
         let pair = format!("{} -> {}", source.shape.name, target.shape.name);
-        let (basis_source, basis_target) = (source.shape.basis.truncated(self.k), target.shape.basis.truncated(self.k));
+        let (basis_source, basis_target) =
+            (source.shape.basis.truncated(self.k), target.shape.basis.truncated(self.k));
         let (functional_map, functional_map_info) = timed(observer, &pair, "functional map", || {
-            let (f, g) = (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
+            let (f, g) =
+                (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
             functional_map(&basis_source, &basis_target, &f, &g, self.solver)
         })?;
         if functional_map_info.rank < self.k {
@@ -232,7 +241,8 @@ impl Matcher {
                 functional_map_info.rank, self.k
             )));
         }
-        let raw = timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
+        let raw =
+            timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
         let map = self.refine(&source.shape, &target.shape, &functional_map, raw, &pair, observer)?;
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
@@ -251,7 +261,8 @@ impl Matcher {
         match self.refinement {
             Refinement::None => Ok(raw),
             Refinement::Icp => {
-                let (basis_source, basis_target) = (source.basis.truncated(self.k), target.basis.truncated(self.k));
+                let (basis_source, basis_target) =
+                    (source.basis.truncated(self.k), target.basis.truncated(self.k));
                 let refined = timed(observer, pair, "icp", || {
                     icp(functional_map, &basis_source, &basis_target, &IcpOptions::default())
                 })?;
@@ -281,7 +292,9 @@ impl Matcher {
         let full_source = self.full_basis(source, observer)?;
         let full_target = self.full_basis(target, observer)?;
         let matches: Vec<(u32, u32)> = (0..map.len())
-            .filter_map(|i| Some((source.shape.full_of_work(i as u32), target.shape.full_of_work(map.get(i)?))))
+            .filter_map(|i| {
+                Some((source.shape.full_of_work(i as u32), target.shape.full_of_work(map.get(i)?)))
+            })
             .collect();
         let (phi, psi) = delta_coefficients(&full_source, &full_target, &matches);
         let (full_map, info) = timed(observer, pair, "upscale", || match self.upscaling {
@@ -333,9 +346,8 @@ fn in_input_vertices(source: &Shape, target: &Shape, map: &PointMap) -> PointMap
     let target_of = |v: &Option<usize>| {
         v.and_then(|v| map.get(v)).map_or(PointMap::UNMATCHED, |t| target.input_of_full[t as usize])
     };
-    let confidence = map.confidence.as_ref().map(|values| {
-        full.iter().map(|v| v.map_or(0.0, |v| values[v])).collect()
-    });
+    let confidence =
+        map.confidence.as_ref().map(|values| full.iter().map(|v| v.map_or(0.0, |v| values[v])).collect());
     PointMap { targets: full.iter().map(target_of).collect(), confidence, n_target: target.n_input }
 }
 

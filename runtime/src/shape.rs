@@ -8,7 +8,7 @@ use crate::descriptor::{ShotOptions, shot};
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
 use crate::mesh::{DecimateOptions, RepairOptions, decimate, repair};
-use crate::spectral::{Eigenbasis, EigenOptions, Laplacian, eigenbasis};
+use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::{Matrix, Mesh};
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,12 @@ impl Shape {
     pub const NONE: u32 = u32::MAX;
 
     /// Runs every stage on a mesh as read.
-    pub fn process(name: &str, mesh: &Mesh, options: &ShapeOptions, observer: Observer) -> Result<Self, Error> {
+    pub fn process(
+        name: &str,
+        mesh: &Mesh,
+        options: &ShapeOptions,
+        observer: Observer,
+    ) -> Result<Self, Error> {
         let in_shape = |e: Error| e.in_shape(name);
         let repaired = timed(observer, name, "repair", || repair(mesh, &RepairOptions::default()))
             .map_err(|e| in_shape(e.into()))?;

@@ -69,7 +69,8 @@ fn prepare_python(folder: &Path) -> Result<PathBuf, String> {
     let requirements = root().join("tests/python/requirements.txt");
     let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     once(folder, &requirements, || {
-        let system = ["python3", "python"].into_iter().find(|p| run(Command::new(p).arg("--version")).is_ok());
+        let system =
+            ["python3", "python"].into_iter().find(|p| run(Command::new(p).arg("--version")).is_ok());
         run(Command::new(system.ok_or("no python3 on the PATH")?).args(["-m", "venv"]).arg(folder))?;
         let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
         run(Command::new(&python).args(install).arg(&requirements))
@@ -90,7 +91,11 @@ fn prepare_javascript(folder: &Path) -> Result<PathBuf, String> {
 }
 
 /// Runs `prepare` unless a file in the folder says that it succeeded with the same requirements.
-fn once(folder: &Path, requirements: &Path, prepare: impl FnOnce() -> Result<(), String>) -> Result<(), String> {
+fn once(
+    folder: &Path,
+    requirements: &Path,
+    prepare: impl FnOnce() -> Result<(), String>,
+) -> Result<(), String> {
     let wanted = std::fs::read_to_string(requirements).map_err(|e| e.to_string())?;
     let marker = folder.join("prepared");
     if std::fs::read_to_string(&marker).is_ok_and(|found| found == wanted) {

@@ -63,7 +63,12 @@ pub enum CheckpointError {
 
 impl Checkpoint {
     /// The state of a runner after `step` minibatches.
-    pub fn of(runner: &StepRunner, config: &TrainConfig, step: u64, best_error: f64) -> Result<Self, CheckpointError> {
+    pub fn of(
+        runner: &StepRunner,
+        config: &TrainConfig,
+        step: u64,
+        best_error: f64,
+    ) -> Result<Self, CheckpointError> {
         Ok(Self {
             config: config.clone(),
             step,
@@ -103,14 +108,16 @@ impl Checkpoint {
             ("best_error".to_string(), self.best_error.to_string()),
         ]);
         let content = |reason: safetensors::SafeTensorError| self.error(path, reason.to_string());
-        let f32_view = |values| TensorView::new(Dtype::F32, vec![values_len(values)], bytemuck::cast_slice(values));
+        let f32_view =
+            |values| TensorView::new(Dtype::F32, vec![values_len(values)], bytemuck::cast_slice(values));
         let tensors = [
             ("adam.first", f32_view(&self.adam.first).map_err(content)?),
             ("adam.second", f32_view(&self.adam.second).map_err(content)?),
             ("parameters", f32_view(&self.parameters).map_err(content)?),
             (
                 "running",
-                TensorView::new(Dtype::F64, vec![running.len()], bytemuck::cast_slice(&running)).map_err(content)?,
+                TensorView::new(Dtype::F64, vec![running.len()], bytemuck::cast_slice(&running))
+                    .map_err(content)?,
             ),
         ];
         let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(content)?;
@@ -119,8 +126,8 @@ impl Checkpoint {
 
     /// Reads the file.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.to_path_buf(), source })?;
+        let bytes = std::fs::read(path)
+            .map_err(|source| CheckpointError::Read { path: path.to_path_buf(), source })?;
         Self::decode(&bytes).map_err(|reason| CheckpointError::Content { path: path.to_path_buf(), reason })
     }
 

@@ -220,16 +220,36 @@ impl TrainConfig {
         range("pairs", self.pairs > 0, &self.pairs, "1 or more")?;
         range("pool", self.pool >= 100, &self.pool, "100 or more")?;
         range("k", (1..=352).contains(&self.k), &self.k, "from 1 to 352, the width of the descriptors")?;
-        range("points", self.points >= self.k, &self.points, "k or more, else the points cannot tell k functions apart")?;
-        range("decimate", self.decimate == 0 || self.decimate >= 500, &self.decimate, "0 (never) or 500 or more")?;
-        range("shot-radius", self.shot_radius > 0.0 && self.shot_radius < 1.0, &self.shot_radius, "between 0 and 1")?;
+        range(
+            "points",
+            self.points >= self.k,
+            &self.points,
+            "k or more, else the points cannot tell k functions apart",
+        )?;
+        range(
+            "decimate",
+            self.decimate == 0 || self.decimate >= 500,
+            &self.decimate,
+            "0 (never) or 500 or more",
+        )?;
+        range(
+            "shot-radius",
+            self.shot_radius > 0.0 && self.shot_radius < 1.0,
+            &self.shot_radius,
+            "between 0 and 1",
+        )?;
         range("mask-weight", self.mask_weight >= 0.0, &self.mask_weight, "0 or more")?;
         range("gamma", (0.0..=1.0).contains(&self.gamma), &self.gamma, "from 0 to 1")?;
         range("margin", self.margin > 0.0, &self.margin, "more than 0")?;
         range("blocks", (1..=64).contains(&self.blocks), &self.blocks, "from 1 to 64")?;
         range("jitter", (1..=100).contains(&self.jitter), &self.jitter, "from 1 (none) to 100")?;
         range("learning-rate", self.learning_rate > 0.0, &self.learning_rate, "more than 0")?;
-        range("final-learning-rate", self.final_learning_rate >= 0.0, &self.final_learning_rate, "0 or more")?;
+        range(
+            "final-learning-rate",
+            self.final_learning_rate >= 0.0,
+            &self.final_learning_rate,
+            "0 or more",
+        )?;
         range("checkpoint-every", self.checkpoint_every > 0, &self.checkpoint_every, "1 or more")
     }
 
@@ -296,7 +316,12 @@ mod tests {
     fn the_saved_configuration_reads_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("config.toml");
-        let config = TrainConfig { k: 70, jitter: 10, dataset: List(vec!["a".into(), "b".into()]), ..Default::default() };
+        let config = TrainConfig {
+            k: 70,
+            jitter: 10,
+            dataset: List(vec!["a".into(), "b".into()]),
+            ..Default::default()
+        };
         std::fs::write(&path, config.to_toml()).unwrap();
         assert_eq!(TrainConfig::read(&path).unwrap(), config);
     }

@@ -79,12 +79,12 @@ pub fn prepare(
         entry.group.as_bytes(),
         &[u8::from(entry.partial)],
     ]);
-    if let Some(pool) = cache.and_then(|cache| cache.fetch("pool", key, observer)).and_then(|b| Pool::decode(&b)) {
+    if let Some(pool) =
+        cache.and_then(|cache| cache.fetch("pool", key, observer)).and_then(|b| Pool::decode(&b))
+    {
         return Ok(PreparedShape { entry: entry.clone(), shape, points, pool });
     }
-    let pool = timed(observer, &entry.name, "geodesics", || {
-        Pool::compute(entry, &shape, &points, options)
-    });
+    let pool = timed(observer, &entry.name, "geodesics", || Pool::compute(entry, &shape, &points, options));
     if let Some(cache) = cache {
         cache.put("pool", key, &pool.encode()).map_err(Error::from)?;
     }
@@ -132,7 +132,8 @@ impl Pool {
         let solver = GeodesicSolver::new(shape.mesh(), &GeodesicOptions::default());
         let unit = shape.mesh().scale() as f32;
         let distances = solver.distances_between(&vertices);
-        let quantised = distances.data().iter().map(|d| (d / unit * Self::STEPS).min(65_535.0).round() as u16);
+        let quantised =
+            distances.data().iter().map(|d| (d / unit * Self::STEPS).min(65_535.0).round() as u16);
         Self { points: chosen, distances: quantised.collect() }
     }
 

@@ -72,7 +72,8 @@ impl<'a> Sampler<'a> {
     fn pair(&self, rng: &mut ChaCha8Rng) -> PairBatch {
         let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
         let points = self.draw(&self.shapes[source], &self.shapes[target], rng);
-        let negatives = if self.config.loss == LossKind::Siamese { negatives(points.len(), rng) } else { Vec::new() };
+        let negatives =
+            if self.config.loss == LossKind::Siamese { negatives(points.len(), rng) } else { Vec::new() };
         PairBatch {
             source: self.sample(source, &points, rng),
             target: self.sample(target, &points, rng),

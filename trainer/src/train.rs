@@ -215,7 +215,12 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn go(&mut self, sampler: &Sampler, validation: &Validation, stop: &AtomicBool) -> Result<TrainSummary, TrainError> {
+    fn go(
+        &mut self,
+        sampler: &Sampler,
+        validation: &Validation,
+        stop: &AtomicBool,
+    ) -> Result<TrainSummary, TrainError> {
         let (first, last) = (self.step, self.config.steps);
         std::thread::scope(|scope| {
             let (sender, batches) = sync_channel(AHEAD);
@@ -230,7 +235,8 @@ impl Run<'_> {
                 let Ok(batch) = batches.recv() else { break };
                 let start = Instant::now();
                 let learning_rate = self.config.learning_rate_at(self.step);
-                let stats = self.runner.step(&batch, learning_rate).map_err(|source| self.step_error(source))?;
+                let stats =
+                    self.runner.step(&batch, learning_rate).map_err(|source| self.step_error(source))?;
                 self.step += 1;
                 let seconds = start.elapsed().as_secs_f64();
                 self.tell(TrainEvent::Step { step: self.step, stats, learning_rate, seconds });

@@ -85,11 +85,8 @@ impl<'a> Validation<'a> {
             .map(|(&a, &b)| (a, b))
             .collect();
         let stride = common.len().div_ceil(POINTS).max(1);
-        let queries: Vec<(u32, u32)> = common
-            .iter()
-            .step_by(stride)
-            .filter_map(|&(a, b)| Some((b, map.get(a as usize)?)))
-            .collect();
+        let queries: Vec<(u32, u32)> =
+            common.iter().step_by(stride).filter_map(|&(a, b)| Some((b, map.get(a as usize)?))).collect();
         let solver = self.solvers[target].as_ref().expect("every target has a solver");
         let unit = t.shape.mesh().scale() as f32;
         Ok(solver.pair_distances(&queries).iter().map(|d| d / unit).collect())

@@ -42,7 +42,8 @@ mod tests {
     #[test]
     fn the_tree_finds_what_a_scan_finds() {
         let mesh = bumpy_sphere(2, 1);
-        let queries: Vec<[f64; 3]> = mesh.vertices().iter().map(|p| [p[0] + 0.03, p[1] - 0.02, p[2] * 1.1]).collect();
+        let queries: Vec<[f64; 3]> =
+            mesh.vertices().iter().map(|p| [p[0] + 0.03, p[1] - 0.02, p[2] * 1.1]).collect();
         let found = nearest_k_vertices(mesh.vertices(), &queries, 3);
         for (q, query) in queries.iter().enumerate() {
             let mut all: Vec<f64> = mesh.vertices().iter().map(|p| vec3::distance(*p, *query)).collect();

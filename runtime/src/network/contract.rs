@@ -145,7 +145,10 @@ pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, Network
     let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file: {e}")))?;
     let graph = model.graph.ok_or_else(|| contract("no graph in it; not an ONNX model".into()))?;
     if let Some(opset) = model.opset_import.iter().find(|o| !o.domain.is_empty() && o.domain != "ai.onnx") {
-        return Err(contract(format!("operators of the domain {:?}; only standard ones are allowed", opset.domain)));
+        return Err(contract(format!(
+            "operators of the domain {:?}; only standard ones are allowed",
+            opset.domain
+        )));
     }
     check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}")))?;
     check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}")))?;

@@ -57,7 +57,9 @@ pub enum NetworkError {
         reason: String,
     },
     /// This build has no such back-end.
-    #[error("this build has no back-end {backend}; build with `--features {backend}`, or choose another with --backend")]
+    #[error(
+        "this build has no back-end {backend}; build with `--features {backend}`, or choose another with --backend"
+    )]
     BackendAbsent {
         /// The back-end asked for.
         backend: Backend,
@@ -141,7 +143,8 @@ impl DescriptorNetwork {
         if shot.cols() != WIDTH {
             return Err(NetworkError::Width { width: shot.cols() });
         }
-        let failed = |reason| NetworkError::Backend { path: PathBuf::from("network"), backend: self.backend, reason };
+        let failed =
+            |reason| NetworkError::Backend { path: PathBuf::from("network"), backend: self.backend, reason };
         self.engine.run(shot).map_err(failed)
     }
 }

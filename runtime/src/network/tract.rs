@@ -3,8 +3,8 @@
 //! tract is fastest when it knows `n`, so the graph is optimised anew for each number of rows and kept while shapes of the same
 //! size follow. It uses one thread; where rows do not depend on each other they are split into blocks of a fixed size.
 
-use super::contract::{ModelMetadata, WIDTH};
 use super::Engine;
+use super::contract::{ModelMetadata, WIDTH};
 use crate::Matrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -50,8 +50,15 @@ impl TractEngine {
         let input = Tensor::from_shape(&[n, WIDTH], rows).map_err(|e| format!("{e:#}"))?;
         let output = self.plan(n)?.run(tvec!(input.into())).map_err(|e| format!("{e:#}"))?;
         let output = output.first().ok_or("no output")?;
-        let values = output.try_as_plain_ram().and_then(|v| Ok(v.as_slice::<f32>()?.to_vec())).map_err(|e| format!("{e:#}"))?;
-        if values.len() == rows.len() { Ok(values) } else { Err(format!("output of shape {:?}", output.shape())) }
+        let values = output
+            .try_as_plain_ram()
+            .and_then(|v| Ok(v.as_slice::<f32>()?.to_vec()))
+            .map_err(|e| format!("{e:#}"))?;
+        if values.len() == rows.len() {
+            Ok(values)
+        } else {
+            Err(format!("output of shape {:?}", output.shape()))
+        }
     }
 }
 

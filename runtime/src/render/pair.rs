@@ -1,10 +1,10 @@
 //! Both shapes of a pair in one mesh, side by side, coloured by the map.
 
 use super::{map_colors, position_colors};
+use crate::Mesh;
 use crate::io::Attributes;
 use crate::mesh::MeshError;
 use crate::point_map::PointMap;
-use crate::Mesh;
 
 /// The source to the left of the target, brought to the same size, matches in the same colour.
 ///

@@ -89,7 +89,12 @@ pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
 }
 
 /// For each landmark of the giver the receiving vertex that takes from nearest to it, if any does.
-pub fn transfer_landmarks(landmarks: &[u32], giver: &Mesh, receiver: &Mesh, donors: &Donors) -> Vec<Option<u32>> {
+pub fn transfer_landmarks(
+    landmarks: &[u32],
+    giver: &Mesh,
+    receiver: &Mesh,
+    donors: &Donors,
+) -> Vec<Option<u32>> {
     let place = |landmark: u32| {
         let at = giver.vertices()[landmark as usize];
         let candidates = (0..receiver.n_vertices() as u32).zip(donors.iter());
@@ -105,7 +110,12 @@ pub fn transfer_landmarks(landmarks: &[u32], giver: &Mesh, receiver: &Mesh, dono
 ///
 /// Vertices without a match are grey, at the texture's origin, NaN and without weights. At a seam of the giver's texture a vertex
 /// has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
-pub fn transfer_attributes(giver: &Mesh, attributes: &Attributes, receiver: &Mesh, donors: &Donors) -> Attributes {
+pub fn transfer_attributes(
+    giver: &Mesh,
+    attributes: &Attributes,
+    receiver: &Mesh,
+    donors: &Donors,
+) -> Attributes {
     let skin = attributes.skin.as_ref().map(|skin| Skin {
         joints: skin.joints.clone(),
         indices: donors.gather(&skin.indices, [0; 4]),
@@ -116,7 +126,9 @@ pub fn transfer_attributes(giver: &Mesh, attributes: &Attributes, receiver: &Mes
         vertex_colors: attributes.vertex_colors.as_ref().map(|c| donors.gather(c, super::UNMATCHED_COLOR)),
         corner_uvs: attributes.corner_uvs.as_ref().map(|uvs| corner_uvs(giver, uvs, receiver, donors)),
         texture: attributes.texture.clone(),
-        vertex_scalars: scalars.map(|(name, values)| (name.clone(), donors.gather(values, f32::NAN))).collect(),
+        vertex_scalars: scalars
+            .map(|(name, values)| (name.clone(), donors.gather(values, f32::NAN)))
+            .collect(),
         skin,
     }
 }

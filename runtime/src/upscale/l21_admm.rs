@@ -60,7 +60,9 @@ pub enum UpscaleError {
         target_rows: usize,
     },
     /// Too few matches to determine the map.
-    #[error("{matches} matches do not determine a map of k = {k} source functions; use a smaller k or more matches")]
+    #[error(
+        "{matches} matches do not determine a map of k = {k} source functions; use a smaller k or more matches"
+    )]
     TooFewMatches {
         /// Number of matches.
         matches: usize,
@@ -68,7 +70,9 @@ pub enum UpscaleError {
         k: usize,
     },
     /// The matched source vertices leave some basis function undetermined.
-    #[error("the matched source vertices do not tell {k} basis functions apart; use a smaller k or spread the matches")]
+    #[error(
+        "the matched source vertices do not tell {k} basis functions apart; use a smaller k or spread the matches"
+    )]
     Singular {
         /// Size of the source basis.
         k: usize,
@@ -129,26 +133,27 @@ fn update_split(
     multipliers: &mut Matrix,
 ) -> SplitStep {
     let k = psi.cols();
-    let rows: Vec<(f64, f64)> = (split.data_mut().par_chunks_mut(k), multipliers.data_mut().par_chunks_mut(k))
-        .into_par_iter()
-        .enumerate()
-        .map(|(j, (z, u))| {
-            let residual = fitted.row(j).iter().zip(psi.row(j)).map(|(f, y)| f - y);
-            let wanted: Vec<f64> = residual.zip(u.iter()).map(|(r, u)| r + u).collect();
-            let norm = frobenius(&wanted);
-            let shrink = if norm * rho > 1.0 { 1.0 - 1.0 / (norm * rho) } else { 0.0 };
-            let (mut primal, mut dual) = (0.0, 0.0);
-            for i in 0..k {
-                let new = shrink * wanted[i];
-                dual += (new - z[i]).powi(2);
-                let new_multiplier = wanted[i] - new;
-                primal += (new_multiplier - u[i]).powi(2);
-                z[i] = new;
-                u[i] = new_multiplier;
-            }
-            (primal, dual)
-        })
-        .collect();
+    let rows: Vec<(f64, f64)> =
+        (split.data_mut().par_chunks_mut(k), multipliers.data_mut().par_chunks_mut(k))
+            .into_par_iter()
+            .enumerate()
+            .map(|(j, (z, u))| {
+                let residual = fitted.row(j).iter().zip(psi.row(j)).map(|(f, y)| f - y);
+                let wanted: Vec<f64> = residual.zip(u.iter()).map(|(r, u)| r + u).collect();
+                let norm = frobenius(&wanted);
+                let shrink = if norm * rho > 1.0 { 1.0 - 1.0 / (norm * rho) } else { 0.0 };
+                let (mut primal, mut dual) = (0.0, 0.0);
+                for i in 0..k {
+                    let new = shrink * wanted[i];
+                    dual += (new - z[i]).powi(2);
+                    let new_multiplier = wanted[i] - new;
+                    primal += (new_multiplier - u[i]).powi(2);
+                    z[i] = new;
+                    u[i] = new_multiplier;
+                }
+                (primal, dual)
+            })
+            .collect();
     let (primal, dual) = rows.iter().fold((0.0, 0.0), |(p, d), row| (p + row.0, d + row.1));
     SplitStep { primal: primal.sqrt(), dual: dual.sqrt() }
 }
@@ -306,9 +311,8 @@ mod tests {
         let residual = difference(&product(&phi, &transposed(&c)), &psi);
         for i in 0..6 {
             for t in 0..5 {
-                let slope: f64 = (0..300)
-                    .map(|j| phi[(j, i)] * residual[(j, t)] / frobenius(residual.row(j)))
-                    .sum();
+                let slope: f64 =
+                    (0..300).map(|j| phi[(j, i)] * residual[(j, t)] / frobenius(residual.row(j))).sum();
                 assert!(slope.abs() < 1e-4, "slope {slope} at ({i}, {t})");
             }
         }

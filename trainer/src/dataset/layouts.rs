@@ -156,6 +156,9 @@ mod tests {
 
     #[test]
     fn the_papers_test_subjects_are_never_trained_on() {
-        assert_eq!([59, 60, 79, 80].map(faust_split), [Split::Train, Split::Validation, Split::Validation, Split::Test]);
+        assert_eq!(
+            [59, 60, 79, 80].map(faust_split),
+            [Split::Train, Split::Validation, Split::Validation, Split::Test]
+        );
     }
 }

@@ -22,7 +22,10 @@ pub(super) fn shapes(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
                 shapes.extend(of_class.enumerate().map(|(i, mesh)| ShapeEntry {
                     name: stem(&mesh),
                     group: class.clone(),
-                    correspondence: Correspondence::Barycentric(mesh.with_extension("baryc_gt"), whole.clone()),
+                    correspondence: Correspondence::Barycentric(
+                        mesh.with_extension("baryc_gt"),
+                        whole.clone(),
+                    ),
                     split: if i < TRAINING_PARTS { Split::Train } else { Split::Test },
                     partial: true,
                     mesh,
@@ -62,11 +65,8 @@ pub(super) fn points(ground_truth: &Path, whole: &Path) -> Result<Vec<u32>, Data
             return Err(wrong(&format!("triangle {face}, but the whole shape has {}", whole.n_faces())));
         }
         let corners = whole.faces()[*face as usize - 1];
-        let (corner, &weight) = corners
-            .iter()
-            .zip(weights)
-            .max_by(|a, b| a.1.total_cmp(b.1))
-            .expect("a triangle has corners");
+        let (corner, &weight) =
+            corners.iter().zip(weights).max_by(|a, b| a.1.total_cmp(b.1)).expect("a triangle has corners");
         if weight > best[*corner as usize] {
             best[*corner as usize] = weight;
             points[*corner as usize] = vertex as u32;

@@ -260,7 +260,10 @@ fn non_negative(text: &str) -> Result<f64, String> {
 }
 
 fn radius(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|&x| x > 0.0 && x < 1.0).ok_or_else(|| "expected a number between 0 and 1".into())
+    text.parse()
+        .ok()
+        .filter(|&x| x > 0.0 && x < 1.0)
+        .ok_or_else(|| "expected a number between 0 and 1".into())
 }
 
 impl PipelineArgs {

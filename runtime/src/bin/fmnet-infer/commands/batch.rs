@@ -41,13 +41,16 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
             }
             Err(error) => {
                 console.warn(&format!("{} of {}: {error:#}", number + 1, pairs.len()));
-                failures.push(json!({ "source": pair.source, "target": pair.target, "error": format!("{error:#}") }));
+                failures.push(
+                    json!({ "source": pair.source, "target": pair.target, "error": format!("{error:#}") }),
+                );
             }
         }
     }
     let text = format!("{done} matched, {skipped} were there already, {} failed", failures.len());
     let failed = failures.len();
-    let summary = json!({ "matched": done, "skipped": skipped, "failed": Value::Array(failures), "out": args.out });
+    let summary =
+        json!({ "matched": done, "skipped": skipped, "failed": Value::Array(failures), "out": args.out });
     console.result(&text, summary);
     if failed > 0 {
         bail!("{failed} of {} pairs failed; mend or remove them and run the same command again", pairs.len());

@@ -52,6 +52,9 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
         },
     )?;
     let seconds = start.elapsed().as_secs_f64();
-    console.result(&text, json!({ "summary": summary, "match_seconds": match_seconds, "seconds": seconds, "viewer": args.out }));
+    console.result(
+        &text,
+        json!({ "summary": summary, "match_seconds": match_seconds, "seconds": seconds, "viewer": args.out }),
+    );
     Ok(())
 }

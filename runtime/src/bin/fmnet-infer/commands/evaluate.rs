@@ -27,7 +27,8 @@ pub(crate) fn run(args: &EvaluateArgs, console: &Console) -> Result<()> {
     check_outputs(args)?;
     let (source, target) = (read(&args.source, console)?, read(&args.target, console)?);
     let truth = load(&args.ground_truth, &source, &target)?;
-    let mirrored = args.symmetric_ground_truth.as_deref().map(|text| load(text, &source, &target)).transpose()?;
+    let mirrored =
+        args.symmetric_ground_truth.as_deref().map(|text| load(text, &source, &target)).transpose()?;
     let solver = GeodesicSolver::new(&target, &GeodesicOptions::default());
     let mut results = Vec::new();
     for path in &args.maps {

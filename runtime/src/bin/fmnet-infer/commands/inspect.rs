@@ -31,7 +31,8 @@ fn inspect_mesh(path: &Path, console: &Console) -> Result<()> {
 fn inspect_model(path: &Path, console: &Console) -> Result<()> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let metadata = read_contract(path, &bytes)?;
-    let lines: Vec<String> = metadata.to_pairs().iter().map(|(key, value)| format!("  {key}: {value}")).collect();
+    let lines: Vec<String> =
+        metadata.to_pairs().iter().map(|(key, value)| format!("  {key}: {value}")).collect();
     let text = format!("{}: a descriptor network of fmnet\n{}", file_name(path), lines.join("\n"));
     console.result(&text, json!({ "file": path, "metadata": metadata }));
     Ok(())

@@ -34,8 +34,10 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
         write_matrix(path, &result.functional_map)?;
     }
     let mut summary = summary(&matcher, &result);
-    summary["source"] = json!({ "file": args.source, "vertices": source.n_vertices(), "faces": source.n_faces() });
-    summary["target"] = json!({ "file": args.target, "vertices": target.n_vertices(), "faces": target.n_faces() });
+    summary["source"] =
+        json!({ "file": args.source, "vertices": source.n_vertices(), "faces": source.n_faces() });
+    summary["target"] =
+        json!({ "file": args.target, "vertices": target.n_vertices(), "faces": target.n_faces() });
     summary["outputs"] = json!(args.outputs);
     summary["seconds"] = json!(start.elapsed().as_secs_f64());
     console.result(&text, summary);

@@ -33,14 +33,20 @@ pub(crate) fn run(args: &TransferArgs, console: &Console) -> Result<()> {
             write_transferred_mesh(output, giver, &receiver.mesh, &donors)?;
         } else {
             let input = values.next().with_context(|| {
-                format!("{}: no --values file is left for this output; give one --values for each", output.display())
+                format!(
+                    "{}: no --values file is left for this output; give one --values for each",
+                    output.display()
+                )
             })?;
             write_transferred_values(input, output, &giver.mesh, &receiver.mesh, &donors)?;
         }
     }
     let without = donors.iter().filter(|d| d.is_none()).count();
     let text = format!("{} vertices received, {without} have no match", donors.len() - without);
-    console.result(&text, json!({ "received": donors.len() - without, "without_match": without, "outputs": args.outputs }));
+    console.result(
+        &text,
+        json!({ "received": donors.len() - without, "without_match": without, "outputs": args.outputs }),
+    );
     Ok(())
 }
 
@@ -63,7 +69,12 @@ fn write_transferred_values(
     }
     let values = read_matrix::<f64>(input)?;
     if values.rows() != giver.n_vertices() {
-        bail!("{}: {} rows, but the giving mesh has {} vertices", input.display(), values.rows(), giver.n_vertices());
+        bail!(
+            "{}: {} rows, but the giving mesh has {} vertices",
+            input.display(),
+            values.rows(),
+            giver.n_vertices()
+        );
     }
     Ok(write_matrix(output, &transfer_values(&values, donors))?)
 }

@@ -16,14 +16,22 @@ pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
         noise: args.noise,
         ..SynthOptions::default()
     };
-    let options =
-        DatasetOptions { per_species: args.count as usize, seed: args.seed, body, ..DatasetOptions::default() };
+    let options = DatasetOptions {
+        per_species: args.count as usize,
+        seed: args.seed,
+        body,
+        ..DatasetOptions::default()
+    };
     let progress = Progress::new(common);
     write_dataset(&args.folder, &options, &|done, total| {
         progress.event(TrainEvent::Prepared { done, total, shape: "body".into() });
     })?;
     let shapes = options.per_species * options.species.len();
-    progress.say(&format!("{shapes} bodies of {} species in {}", options.species.len(), args.folder.display()));
+    progress.say(&format!(
+        "{shapes} bodies of {} species in {}",
+        options.species.len(),
+        args.folder.display()
+    ));
     if common.json {
         println!("{:#}", json!({ "folder": args.folder, "shapes": shapes }));
     }

@@ -17,7 +17,8 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
     };
     args.overrides.apply(&mut config);
     let device = match args.cuda {
-        true => Device::new_cuda(0).context("no CUDA device; build with `--features cuda`, or leave --cuda out")?,
+        true => Device::new_cuda(0)
+            .context("no CUDA device; build with `--features cuda`, or leave --cuda out")?,
         false => Device::Cpu,
     };
     let stop = Arc::new(AtomicBool::new(false));
@@ -32,13 +33,17 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
     let summary = train(&config, &device, &|event| progress.event(event), &stop)?;
     let out = config.out.display();
     if summary.stopped {
-        progress.say(&format!("stopped after minibatch {}; the same command goes on from there", summary.step));
+        progress
+            .say(&format!("stopped after minibatch {}; the same command goes on from there", summary.step));
     } else {
         progress.say(&format!("done; write the model with: fmnet-train export {out} -o model.onnx"));
     }
     if common.json {
         let best = summary.best_error.is_finite().then_some(summary.best_error);
-        println!("{:#}", json!({ "out": config.out, "step": summary.step, "stopped": summary.stopped, "best_error": best }));
+        println!(
+            "{:#}",
+            json!({ "out": config.out, "step": summary.step, "stopped": summary.stopped, "best_error": best })
+        );
     }
     Ok(())
 }
