@@ -1,7 +1,8 @@
 //! Seconds of the exact nearest neighbour search between two spectral embeddings, from 1K to 200K points.
 //!
-//! The embeddings are those of a long rectangle, sampled at random, moved by a functional map with as much noise as signal. Peers to
-//! compare with: a matrix product of the two embeddings and the row-wise minimum, in NumPy.
+//! The embeddings are those of a long rectangle, sampled at random, moved by a functional map with as much
+//! noise as signal. Peers to compare with: a matrix product of the two embeddings and the row-wise minimum,
+//! in NumPy.
 //!
 //! `cargo bench --bench nearest -- [n ...]`; `RAYON_NUM_THREADS` sets the threads.
 

@@ -10,11 +10,12 @@ use rayon::prelude::*;
 /// Source vertices whose contributions are summed by one product; the sums are added in order.
 const CHUNK: usize = 4096;
 
-/// The functional map `C`, `[k_target, k_source]`, source to target, of a point map from the source to the target.
+/// The functional map `C`, `[k_target, k_source]`, source to target, of a point map from the source to the
+/// target.
 ///
-/// A point map `T` from source to target pulls functions back, from target to source: `f o T`, in coefficients
-/// `Phi^T A Psi[T]`, `[k_source, k_target]`, where row `x` of `Psi[T]` is row `T(x)` of `Psi`. The map in the source's
-/// own direction is its adjoint,
+/// A point map `T` from source to target pulls functions back, from target to source: `f o T`, in
+/// coefficients `Phi^T A Psi[T]`, `[k_source, k_target]`, where row `x` of `Psi[T]` is row `T(x)` of `Psi`.
+/// The map in the source's own direction is its adjoint,
 ///
 /// `C = (Phi^T A Psi[T])^T = Psi[T]^T A Phi`,
 ///

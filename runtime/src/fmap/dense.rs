@@ -15,8 +15,18 @@ pub(crate) fn multiply(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Matrix 
     product
 }
 
-/// The thin singular value decomposition `A = U diag(s) V^T`, `[m, r]`, `[r]` descending, `[n, r]`, `r = min(m, n)`.
-pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<(Mat<f64>, Vec<f64>, Mat<f64>), FmapError> {
+/// The thin singular value decomposition `A = U diag(s) V^T` of an `[m, n]` matrix, `r = min(m, n)`.
+pub(crate) struct ThinSvd {
+    /// `[m, r]`.
+    pub(crate) u: Mat<f64>,
+    /// Descending, `[r]`.
+    pub(crate) s: Vec<f64>,
+    /// `[n, r]`.
+    pub(crate) v: Mat<f64>,
+}
+
+/// The thin singular value decomposition of `matrix`.
+pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<ThinSvd, FmapError> {
     let (rows, cols) = matrix.shape();
     let size = rows.min(cols);
     let (mut u, mut v) = (Mat::zeros(rows, size), Mat::zeros(cols, size));
@@ -34,11 +44,11 @@ pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<(Mat<f64>, Vec<f64>, M
     )
     .map_err(|_| FmapError::NoConvergence { rows, cols })?;
     let s = s.column_vector().iter().copied().collect();
-    Ok((u, s, v))
+    Ok(ThinSvd { u, s, v })
 }
 
-/// The solution of `gram X = right` for a positive definite `gram`, `[k, k]`; `None` where it is singular to working
-/// precision.
+/// The solution of `gram X = right` for a positive definite `gram`, `[k, k]`; `None` where it is singular to
+/// working precision.
 pub(crate) fn solve_positive_definite(gram: &Matrix, right: &Matrix) -> Option<Matrix> {
     let k = gram.rows();
     let scratch = factor::cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default())

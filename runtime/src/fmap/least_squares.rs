@@ -1,13 +1,14 @@
 //! The functional map of the paper: plain least squares.
 
+use super::dense::ThinSvd;
 use super::{FmapError, FmapInfo, check_system, dense, relative_residual};
 use crate::Matrix;
 
 /// Options of [`least_squares`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeastSquaresOptions {
-    /// Singular values of `F^` below this share of the largest count as zero. Range 0 to 1, default 1e-8: descriptors are single
-    /// precision, so what lies below their rounding says nothing about the shape.
+    /// Singular values of `F^` below this share of the largest count as zero. Range 0 to 1, default 1e-8:
+    /// descriptors are single precision, so what lies below their rounding says nothing about the shape.
     pub relative_threshold: f64,
 }
 
@@ -19,17 +20,17 @@ impl Default for LeastSquaresOptions {
 
 /// `C = G^ F^+`, `[k_target, k_source]`, which minimises `||C F^ - G^||_F` (Litany et al. 2017, eq. 2).
 ///
-/// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`. The pseudo-inverse is taken through the singular values of `F^`,
-/// not through the normal equations, which would square its condition number. Directions below
-/// [`LeastSquaresOptions::relative_threshold`] are left out, so that with dependent or too few descriptors (`q < k_source`) the
-/// result is the solution of least norm; [`FmapInfo::rank`] tells.
+/// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`. The pseudo-inverse is taken through the singular
+/// values of `F^`, not through the normal equations, which would square its condition number. Directions
+/// below [`LeastSquaresOptions::relative_threshold`] are left out, so that with dependent or too few
+/// descriptors (`q < k_source`) the result is the solution of least norm; [`FmapInfo::rank`] tells.
 pub fn least_squares(
     f_hat: &Matrix,
     g_hat: &Matrix,
     options: &LeastSquaresOptions,
 ) -> Result<(Matrix, FmapInfo), FmapError> {
     check_system(f_hat, g_hat)?;
-    let (u, s, v) = dense::thin_svd(f_hat.as_faer())?;
+    let ThinSvd { u, s, v } = dense::thin_svd(f_hat.as_faer())?;
     let rank = s.iter().take_while(|&&x| x > 0.0 && x >= options.relative_threshold * s[0]).count();
     // G^ V S^+ U^T
     let mut projected = dense::multiply(g_hat.as_faer(), v.as_ref());

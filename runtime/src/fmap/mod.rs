@@ -1,8 +1,9 @@
 //! Functional maps: least squares, the regularised solve, soft correspondence.
 //!
-//! A functional map `C`, `[k_target, k_source]`, takes the Fourier coefficients of a function on the source to those
-//! of the corresponding function on the target. From descriptors with coefficients `F^ = Phi^T A F`,
-//! `[k_source, q]`, and `G^`, `[k_target, q]`, it is the solution of `C F^ = G^` in the sense of a [`FmapSolver`].
+//! A functional map `C`, `[k_target, k_source]`, takes the Fourier coefficients of a function on the source
+//! to those of the corresponding function on the target. From descriptors with coefficients `F^ = Phi^T A F`,
+//! `[k_source, q]`, and `G^`, `[k_target, q]`, it is the solution of `C F^ = G^` in the sense of a
+//! [`FmapSolver`].
 
 mod adjoint;
 mod dense;
@@ -30,8 +31,9 @@ pub enum FmapSolver {
     LeastSquares,
     /// With the resolvent mask, which asks the map to commute with the Laplacians, [`regularized`].
     Regularized {
-        /// Weight of the mask, relative to the mean diagonal of `F^ F^T`. Range 0 (plain least squares) upwards, default
-        /// [`FmapSolver::DEFAULT_MASK_WEIGHT`]. A stronger mask, 1.0, helps across different connectivities.
+        /// Weight of the mask, relative to the mean diagonal of `F^ F^T`. Range 0 (plain least squares)
+        /// upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`]. A stronger mask, 1.0, helps across different
+        /// connectivities.
         weight: f64,
     },
 }
@@ -46,8 +48,9 @@ impl FmapSolver {
 pub struct FmapInfo {
     /// Number of independent directions kept in the worst conditioned system, at most `k_source`.
     pub rank: usize,
-    /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of `F^`, infinite where
-    /// `F^` has linearly dependent rows; for the regularised solve a lower bound, from the pivots, of that of the worst row's system.
+    /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of
+    /// `F^`, infinite where `F^` has linearly dependent rows; for the regularised solve a lower bound, from
+    /// the pivots, of that of the worst row's system.
     pub condition: f64,
     /// `||C F^ - G^||_F / ||G^||_F`; 0 where `G^` is zero.
     pub relative_residual: f64,
@@ -135,8 +138,8 @@ pub enum FmapError {
     },
 }
 
-/// The functional map `C`, `[k_target, k_source]`, that takes the descriptors' coefficients `f_hat`, `[k_source, q]`,
-/// to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
+/// The functional map `C`, `[k_target, k_source]`, that takes the descriptors' coefficients `f_hat`,
+/// `[k_source, q]`, to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
 pub fn functional_map(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,

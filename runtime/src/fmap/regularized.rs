@@ -1,5 +1,6 @@
 //! The functional map with the resolvent mask.
 
+use super::dense::ThinSvd;
 use super::{FmapError, FmapInfo, check_length, check_system, dense, relative_residual};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
@@ -10,7 +11,8 @@ use rayon::prelude::*;
 
 /// Exponent of the normalised eigenvalues in the resolvent.
 const RESOLVENT_EXPONENT: f64 = 0.5;
-/// Singular values of a row's system below this share of the largest count as zero where its Cholesky factor fails.
+/// Singular values of a row's system below this share of the largest count as zero where its Cholesky factor
+/// fails.
 const SINGULAR: f64 = 1e-12;
 
 /// Eigenvalues times the area of the shape, `[k]`: pure numbers, the same for a shape at any scale.
@@ -19,16 +21,17 @@ pub fn scale_free_eigenvalues(basis: &Eigenbasis) -> Vec<f64> {
     basis.eigenvalues.iter().map(|eigenvalue| eigenvalue * area).collect()
 }
 
-/// The resolvent mask `D`, `[k_target, k_source]` (Ren et al. 2019, "Structured regularization of functional map
-/// computations").
+/// The resolvent mask `D`, `[k_target, k_source]` (Ren et al. 2019, "Structured regularization of functional
+/// map computations").
 ///
 /// Entry `(i, j)` tells how far apart the resolvents of the two Laplacians are at target eigenvalue `i` and
-/// source eigenvalue `j`, and so how little a map that commutes with the Laplacians would use it: with `g = (lambda / s)^0.5`,
-/// `s` the largest of all eigenvalues, `D = (re_i - re_j)^2 + (im_i - im_j)^2`, where `re = g / (g^2 + 1)`,
-/// `im = 1 / (g^2 + 1)`. Entries lie between 0 and 1/2.
+/// source eigenvalue `j`, and so how little a map that commutes with the Laplacians would use it: with `g =
+/// (lambda / s)^0.5`, `s` the largest of all eigenvalues, `D = (re_i - re_j)^2 + (im_i - im_j)^2`, where `re
+/// = g / (g^2 + 1)`, `im = 1 / (g^2 + 1)`. Entries lie between 0 and 1/2.
 ///
-/// The mask does not change when both shapes are scaled together. To let shapes of different size match, pass eigenvalues times area, as
-/// [`scale_free_eigenvalues`] gives them. Eigenvalues below zero, which are rounded zeros, count as zero.
+/// The mask does not change when both shapes are scaled together. To let shapes of different size match, pass
+/// eigenvalues times area, as [`scale_free_eigenvalues`] gives them. Eigenvalues below zero, which are
+/// rounded zeros, count as zero.
 pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) -> Matrix {
     let largest = eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(0.0, f64::max);
     let scale = if largest > 0.0 { largest } else { 1.0 };
@@ -45,13 +48,13 @@ pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) ->
     })
 }
 
-/// The map `C`, `[k_target, k_source]`, that minimises `||C F^ - G^||_F^2 + weight d sum_ij D_ij C_ij^2`, with the [`resolvent_mask`] `D` and `d` the
-/// mean diagonal of `F^ F^T`.
+/// The map `C`, `[k_target, k_source]`, that minimises `||C F^ - G^||_F^2 + weight d sum_ij D_ij C_ij^2`,
+/// with the [`resolvent_mask`] `D` and `d` the mean diagonal of `F^ F^T`.
 ///
-/// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`; the eigenvalues, `[k_source]` and `[k_target]`, should be
-/// [`scale_free_eigenvalues`]. The rows of `C` are independent: row `i` solves
-/// `(F^ F^T + weight d diag(D_i)) c_i = F^ g_i` by a Cholesky factorisation of its own. A row whose system is singular gets the solution of
-/// least norm, and [`FmapInfo::rank`] tells.
+/// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`; the eigenvalues, `[k_source]` and `[k_target]`,
+/// should be [`scale_free_eigenvalues`]. The rows of `C` are independent: row `i` solves `(F^ F^T + weight d
+/// diag(D_i)) c_i = F^ g_i` by a Cholesky factorisation of its own. A row whose system is singular gets the
+/// solution of least norm, and [`FmapInfo::rank`] tells.
 pub fn regularized(
     f_hat: &Matrix,
     g_hat: &Matrix,
@@ -143,7 +146,7 @@ impl RowSolver {
     /// The solution of least norm, by the singular value decomposition.
     fn solve_singular(&self, row: &mut [f64]) -> Result<RowInfo, FmapError> {
         let k = row.len();
-        let (u, s, v) = dense::thin_svd(self.system.as_ref())?;
+        let ThinSvd { u, s, v } = dense::thin_svd(self.system.as_ref())?;
         let rank = s.iter().take_while(|&&x| x > SINGULAR * s[0]).count();
         let right = Matrix::from_vec(k, 1, row.to_vec());
         let mut coefficients = dense::multiply(u.transpose(), right.as_faer());

@@ -19,10 +19,12 @@ pub enum ColumnNorm {
     L1,
 }
 
-/// The soft correspondence `P = |Psi C Phi^T A|^`, `[n_target, n_source]` (Litany et al. 2017, eq. 6), of a functional map.
+/// The soft correspondence `P = |Psi C Phi^T A|^`, `[n_target, n_source]` (Litany et al. 2017, eq. 6), of a
+/// functional map.
 ///
-/// Column `x` says where on the target the source vertex `x` may lie. The columns are normalised, so that the area `A_x` in column `x`
-/// cancels; it is left out, which also gives vertices without area a column. A column of zeros stays zero.
+/// Column `x` says where on the target the source vertex `x` may lie. The columns are normalised, so that the
+/// area `A_x` in column `x` cancels; it is left out, which also gives vertices without area a column. A
+/// column of zeros stays zero.
 #[derive(Clone, Debug)]
 pub struct SoftCorrespondence<'a> {
     /// `Phi C^T`, `[n_source, k_target]`.
@@ -39,7 +41,8 @@ pub struct SoftPeak {
     pub target: u32,
     /// The entry, 0 to 1, under the chosen norm.
     pub weight: f64,
-    /// Over how many target vertices the column effectively spreads: `(sum p)^2 / sum p^2`, from 1 (certain) to `n_target`; 0 for a column of zeros.
+    /// Over how many target vertices the column effectively spreads: `(sum p)^2 / sum p^2`, from 1 (certain)
+    /// to `n_target`; 0 for a column of zeros.
     pub spread: f64,
 }
 

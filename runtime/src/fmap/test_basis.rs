@@ -3,8 +3,8 @@
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
 
-/// The first `k` Neumann eigenfunctions of a 1 x 1.37 rectangle, sampled at the centres of `nx` x `ny` cells, where they
-/// are exactly orthonormal.
+/// The first `k` Neumann eigenfunctions of a 1 x 1.37 rectangle, sampled at the centres of `nx` x `ny` cells,
+/// where they are exactly orthonormal.
 pub(crate) fn rectangle(nx: usize, ny: usize, k: usize) -> Eigenbasis {
     let height = 1.37;
     let wave = |order: usize| std::f64::consts::PI * order as f64;

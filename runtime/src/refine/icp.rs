@@ -4,7 +4,7 @@ use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::{functional_map_of, multiply, thin_svd};
 use crate::point_map::search::NearestRows;
-use crate::point_map::{PointMap, RecoverError, transport};
+use crate::point_map::{PointMap, RecoverError, cosines, transport};
 use crate::spectral::Eigenbasis;
 
 /// Options of [`icp`].
@@ -25,17 +25,18 @@ impl Default for IcpOptions {
 pub struct IcpInfo {
     /// Whether the matches stopped changing.
     pub converged: bool,
-    /// Root of the area-weighted mean of `|C phi(x) - psi(T(x))|^2` at the start of each round and at the end; it
-    /// never increases from the second on.
+    /// Root of the area-weighted mean of `|C phi(x) - psi(T(x))|^2` at the start of each round and at the
+    /// end; it never increases from the second on.
     pub residuals: Vec<f64>,
 }
 
-/// Refines the functional map `c`, `[k_target, k_source]`, to a map with orthonormal columns (or rows, if it has
-/// fewer) that explains its own point map.
+/// Refines the functional map `c`, `[k_target, k_source]`, to a map with orthonormal columns (or rows, if it
+/// has fewer) that explains its own point map.
 ///
-/// Each round finds for every source vertex the nearest target row to `C phi(x)`, and then the orthonormal `C` that
-/// minimises `sum_x A_x |C phi(x) - psi(T(x))|^2`: with the singular value decomposition `Psi[T]^T A Phi = U S V^T`, it is `U V^T`. An
-/// orthonormal functional map preserves areas, which holds for nearly isometric shapes; for others prefer ZoomOut.
+/// Each round finds for every source vertex the nearest target row to `C phi(x)`, and then the orthonormal
+/// `C` that minimises `sum_x A_x |C phi(x) - psi(T(x))|^2`: with the singular value decomposition `Psi[T]^T A
+/// Phi = U S V^T`, it is `U V^T`. An orthonormal functional map preserves areas, which holds for nearly
+/// isometric shapes; for others prefer ZoomOut.
 pub fn icp(
     c: &Matrix,
     basis_source: &Eigenbasis,
@@ -60,8 +61,8 @@ pub fn icp(
     let mut functional_map = c.clone();
     let mut map = recover(c)?;
     for _ in 0..options.max_iterations {
-        let (u, _, v) = thin_svd(functional_map_of(&map, basis_source, basis_target)?.as_faer())?;
-        functional_map = multiply(u.as_ref(), v.transpose());
+        let svd = thin_svd(functional_map_of(&map, basis_source, basis_target)?.as_faer())?;
+        functional_map = multiply(svd.u.as_ref(), svd.v.transpose());
         let next = recover(&functional_map)?;
         let settled = next == map;
         map = next;
@@ -70,6 +71,8 @@ pub fn icp(
             break;
         }
     }
+    let transported = transport(&basis_source.eigenvectors, &functional_map);
+    map.confidence = Some(cosines(&transported, &basis_target.eigenvectors, &map.targets));
     Ok(Refined { map, functional_map, info })
 }
 

@@ -15,7 +15,7 @@ pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 /// A refined map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refined<Info> {
-    /// The point map from the source to the target.
+    /// The point map from the source to the target, with confidences.
     pub map: PointMap,
     /// The functional map it was recovered from, `[k_target, k_source]`.
     pub functional_map: Matrix,

@@ -31,6 +31,7 @@ fn icp_finds_the_identity_from_a_disturbed_map() {
     let refined = icp(&disturbed(40, 0.1), &basis, &basis, &IcpOptions::default()).unwrap();
     assert!(refined.info.converged);
     assert_eq!(share_exact(&refined.map), 1.0);
+    assert!(refined.map.confidence.iter().flatten().all(|&confidence| confidence > 0.999));
     assert_close(&refined.functional_map, &identity(40), 1e-10);
     let after_first = &refined.info.residuals[1..];
     assert!(after_first.is_sorted_by(|a, b| a >= b), "{:?}", refined.info.residuals);
@@ -55,6 +56,8 @@ fn zoomout_improves_a_small_correct_map() {
     assert_eq!(refined.info.rounds.first(), Some(&6));
     assert_eq!(refined.info.rounds.last(), Some(&60));
     assert_eq!(refined.functional_map.rows(), 60);
+    let confidence = refined.map.confidence.unwrap();
+    assert!(confidence.iter().sum::<f32>() > 0.9 * 1200.0 && confidence.iter().all(|&c| c <= 1.0));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares, multiply, solve_positive_definite};
 use crate::point_map::search::nearest_rows;
-use crate::point_map::{PointMap, transport, transposed};
+use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
 
 /// Options of [`zoomout`].
@@ -13,7 +13,8 @@ use crate::spectral::Eigenbasis;
 pub struct ZoomOutOptions {
     /// Eigenfunctions in the first round. Range 1 and up, default 30; what the initial map gets right.
     pub k_start: usize,
-    /// Eigenfunctions added from round to round. Range 1 and up, default 10; smaller is slower and a little better.
+    /// Eigenfunctions added from round to round. Range 1 and up, default 10; smaller is slower and a little
+    /// better.
     pub k_step: usize,
     /// Eigenfunctions in the last round. Range `k_start` and up, default 200; fewer where a basis has fewer.
     pub k_max: usize,
@@ -32,8 +33,8 @@ impl Default for ZoomOutOptions {
 pub enum ZoomOutSamples {
     /// All of both shapes.
     All,
-    /// So many of each shape, evenly spread, at least; never fewer than three times the eigenfunctions of the last round. The last round takes
-    /// all vertices.
+    /// So many of each shape, evenly spread, at least; never fewer than three times the eigenfunctions of the
+    /// last round. The last round takes all vertices.
     Farthest(usize),
 }
 
@@ -46,13 +47,16 @@ pub struct ZoomOutInfo {
     pub samples: [usize; 2],
 }
 
-/// Refines a point map by alternating between it and its functional map while the number of eigenfunctions `k` grows.
+/// Refines a point map by alternating between it and its functional map while the number of eigenfunctions
+/// `k` grows.
 ///
-/// A round takes the functional map of the point map at `k`, `C = Psi_k[T]^T A Phi_k`, and from it the point map again:
-/// `T(x)` is the `y` for which `C^T psi_k(y)`, the delta function at `y` pulled back to the source, is nearest to `phi_k(x)`. That is the
-/// paper's direction: its functional map is `C^T`. Comparing `C phi(x)` with `psi(y)` on the target instead looks as good but is
-/// much worse (mean error 2.4 instead of 1.1 on a pair of FAUST shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short
-/// rows of `Psi`. Source vertices without a match in `map` have one afterwards.
+/// A round takes the functional map of the point map at `k`, `C = Psi_k[T]^T A Phi_k`, and from it the point
+/// map again: `T(x)` is the `y` for which `C^T psi_k(y)`, the delta function at `y` pulled back to the
+/// source, is nearest to `phi_k(x)`. That is the paper's direction: its functional map is `C^T`. Comparing `C
+/// phi(x)` with `psi(y)` on the target instead looks as good but is much worse (mean error 2.4 instead of 1.1
+/// on a pair of FAUST shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short rows of
+/// `Psi`. Source vertices without a match in `map` have one afterwards. The confidence of a match is the cosine
+/// of the angle between `phi(x)` and `C^T psi(y)` in the last round.
 pub fn zoomout(
     map: &PointMap,
     basis_source: &Eigenbasis,
@@ -93,8 +97,10 @@ fn round(
 ) -> Result<(PointMap, Matrix), RefineError> {
     let (basis_source, basis_target) = (basis_source.truncated(k), basis_target.truncated(k));
     let c = functional_map_of(map, &basis_source, &basis_target)?;
-    let targets = pulled_back_nearest(&basis_source.eigenvectors, &basis_target.eigenvectors, &c)?;
-    Ok((PointMap::new(targets, basis_target.n()), c))
+    let pulled_back = transport(&basis_target.eigenvectors, &transposed(&c));
+    let targets = nearest_rows(&basis_source.eigenvectors, &pulled_back)?.index;
+    let confidence = Some(cosines(&basis_source.eigenvectors, &pulled_back, &targets));
+    Ok((PointMap { targets, confidence, n_target: basis_target.n() }, c))
 }
 
 /// For each row `phi(x)` the `y` with the nearest `C^T psi(y)`.
@@ -105,8 +111,9 @@ fn pulled_back_nearest(phi: &Matrix, psi: &Matrix, c: &Matrix) -> Result<Vec<u32
 
 /// All rounds on samples, then the point map of all vertices; `None` if too few of the samples are matched.
 ///
-/// On samples the eigenvectors are not orthonormal, so that the functional map of a round is the least squares solution of
-/// `C phi(x) = psi(T(x))` over the sampled `x`; over all vertices, weighted by area, that is what [`functional_map_of`] gives.
+/// On samples the eigenvectors are not orthonormal, so that the functional map of a round is the least
+/// squares solution of `C phi(x) = psi(T(x))` over the sampled `x`; over all vertices, weighted by area, that
+/// is what [`functional_map_of`] gives.
 fn on_samples(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
@@ -139,8 +146,8 @@ fn on_samples(
 
 /// The `C`, `[k, k]`, that minimises `sum |C phi(x) - psi(x)|^2` over the rows of `phi` and `psi`, `[m, k]`.
 ///
-/// Evenly spread samples leave the eigenvectors nearly orthogonal, so that the normal equations do; where they are not, the
-/// singular value decomposition takes over.
+/// Evenly spread samples leave the eigenvectors nearly orthogonal, so that the normal equations do; where
+/// they are not, the singular value decomposition takes over.
 fn least_squares_map(phi: &Matrix, psi: &Matrix) -> Result<Matrix, RefineError> {
     let gram = multiply(phi.as_faer().transpose(), phi.as_faer());
     let right = multiply(phi.as_faer().transpose(), psi.as_faer());

@@ -77,9 +77,9 @@ impl Kernels {
         project, (frame: &[f32], queries: [&[f32]; GROUP]) -> [[f32; LANES]; GROUP]
     );
     dispatched!(
-        /// Lower bounds of the squared distances to a leaf's points, from their coordinates `[LOCAL, stride]` and
-        /// remainders `[stride]`, for a query with coordinates `b` and remainder `w`; returns the lowest. The stride is a
-        /// multiple of `LANES`.
+        /// Lower bounds of the squared distances to a leaf's points, from their coordinates `[LOCAL, stride]`
+        /// and remainders `[stride]`, for a query with coordinates `b` and remainder `w`; returns the lowest.
+        /// The stride is a multiple of `LANES`.
         point_bounds,
         (coordinates: &[f32], remainders: &[f32], b: &[f32; LOCAL], w: f32, bounds: &mut [f32]) -> f32
     );

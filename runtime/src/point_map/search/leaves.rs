@@ -9,7 +9,8 @@ use rayon::prelude::*;
 const ROUND_UP: f64 = 1.0 + 1e-6;
 /// A direction shorter than this share of the leaf's radius is rounding noise.
 const NEGLIGIBLE: f64 = 1e-7;
-/// Steps of subspace iteration: the first halves the points left to measure, the second takes off another third.
+/// Steps of subspace iteration: the first halves the points left to measure, the second takes off another
+/// third.
 const SUBSPACE_ITERATIONS: usize = 2;
 /// Coordinate of an unused slot, too far away to be near anything.
 const NOWHERE: f32 = 1e18;
@@ -33,8 +34,8 @@ pub(super) struct LeafShape {
     pub(super) radius: f32,
     /// No point is farther from the plane through the centre along the basis.
     pub(super) remainder: f32,
-    /// The orthonormal basis and, in the last column, the centre, `[d, LANES]`; zero columns where the leaf has fewer
-    /// directions.
+    /// The orthonormal basis and, in the last column, the centre, `[d, LANES]`; zero columns where the leaf
+    /// has fewer directions.
     pub(super) frame: Vec<f32>,
     /// The centre in the basis.
     pub(super) offset: [f32; LOCAL],
@@ -123,8 +124,9 @@ fn describe(rows: &[&[f64]], scale: f64, stride: usize, kernels: Kernels) -> (Ve
 
 /// Up to `LOCAL` orthonormal directions that capture most of `relative`, `[m, d]`.
 ///
-/// Greedy: the farthest remaining point gives the next direction (pivoted Gram-Schmidt, which controls the largest
-/// remainder, the quantity the bounds depend on), and a little subspace iteration turns them to the principal axes.
+/// Greedy: the farthest remaining point gives the next direction (pivoted Gram-Schmidt, which controls the
+/// largest remainder, the quantity the bounds depend on), and a little subspace iteration turns them to the
+/// principal axes.
 fn local_directions(relative: &Matrix, negligible: f64, kernels: Kernels) -> Vec<Vec<f64>> {
     let mut rest = relative.clone();
     let mut norms: Vec<f64> =

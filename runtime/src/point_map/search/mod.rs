@@ -1,18 +1,19 @@
 //! Exact nearest neighbours between the rows of two matrices.
 //!
-//! The rows of a spectral embedding lie on a surface in `R^k`, and the search lives off that. The targets are cut
-//! into small leaves by bisection; each leaf stores its centre, its radius, a basis of the few directions in which
-//! it extends, and for each point the coordinates in that basis and the norm of what is left over. For a query `q`
-//! with coordinates `b` and remainder norm `w` in a leaf, every point `p` of the leaf with coordinates `a` and
-//! remainder norm `e` satisfies
+//! The rows of a spectral embedding lie on a surface in `R^k`, and the search lives off that. The targets are
+//! cut into small leaves by bisection; each leaf stores its centre, its radius, a basis of the few directions
+//! in which it extends, and for each point the coordinates in that basis and the norm of what is left over.
+//! For a query `q` with coordinates `b` and remainder norm `w` in a leaf, every point `p` of the leaf with
+//! coordinates `a` and remainder norm `e` satisfies
 //!
 //! `|q - p|^2 >= |b - a|^2 + max(0, w - e)^2`,
 //!
-//! which is tight because surfaces are locally flat (`e` is small), and stays tight for queries far off the surface,
-//! where a bound by balls fails: the distance `w` to the surface is common to all candidates and cancels. The bound
-//! is taken first for a ball around the leaf, then for the leaf's box, then for each point; what survives is decided
-//! by the distance itself. Bounds are computed in `f32` and loosened by more than their rounding error; distances in `f64`, summed
-//! in one fixed order. The answer is therefore that of a plain double loop, for any number of threads.
+//! which is tight because surfaces are locally flat (`e` is small), and stays tight for queries far off the
+//! surface, where a bound by balls fails: the distance `w` to the surface is common to all candidates and
+//! cancels. The bound is taken first for a ball around the leaf, then for the leaf's box, then for each
+//! point; what survives is decided by the distance itself. Bounds are computed in `f32` and loosened by more
+//! than their rounding error; distances in `f64`, summed in one fixed order. The answer is therefore that of
+//! a plain double loop, for any number of threads.
 
 mod bisect;
 mod kernels;
@@ -120,8 +121,8 @@ pub fn nearest_rows(queries: &Matrix, targets: &Matrix) -> Result<Nearest, Searc
     NearestRows::new(targets)?.nearest(queries)
 }
 
-/// Points in a leaf, at most, and queries in a block: the cost of looking at all leaves falls with it, the cost of looking into those that
-/// are not excluded grows.
+/// Points in a leaf, at most, and queries in a block: the cost of looking at all leaves falls with it, the
+/// cost of looking into those that are not excluded grows.
 fn leaf_size(n_targets: usize) -> usize {
     (((n_targets as f64).sqrt() / 3.0) as usize).clamp(24, 160)
 }

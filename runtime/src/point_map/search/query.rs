@@ -38,7 +38,8 @@ pub(super) fn nearest(search: &NearestRows, queries: &Matrix) -> Nearest {
 struct Scratch {
     /// Inner products of the leaf centres with the block's centre, `[n_leaves]`.
     products: Vec<f32>,
-    /// Leaves that may hold the nearest point of some query, with a lower bound of their distance from the block's centre.
+    /// Leaves that may hold the nearest point of some query, with a lower bound of their distance from the
+    /// block's centre.
     leaves: Vec<(f32, u32)>,
     /// Lower bounds for the points of a leaf, `[stride]`.
     bounds: Vec<f32>,
@@ -100,8 +101,9 @@ struct Block<'a> {
     best: Vec<Best>,
     /// Rounding error of a bound, relative to the square of the lengths that entered it.
     ///
-    /// An inner product of `d` terms is off by at most `(d + 3) u` times both lengths, `u = 2^-24`. A bound takes one such
-    /// product with the centre and, twice, `sqrt(LOCAL)` of them with the basis: below 13 in all.
+    /// An inner product of `d` terms is off by at most `(d + 3) u` times both lengths, `u = 2^-24`. A bound
+    /// takes one such product with the centre and, twice, `sqrt(LOCAL)` of them with the basis: below 13 in
+    /// all.
     tolerance: f32,
 }
 
@@ -157,13 +159,13 @@ impl<'a> Block<'a> {
         self.list_leaves(scratch);
         for next in 0..scratch.leaves.len() {
             let (distance, leaf) = scratch.leaves[next];
-            if next % 8 == 0 && distance > self.farthest_reach() {
+            if next % 8 == 0 && excluded(distance, self.farthest_reach()) {
                 break;
             }
             self.visit(distance, leaf as usize, scratch);
         }
         for (q, position, bound) in scratch.pending.drain(..) {
-            if !(bound > self.best[q as usize].squared_reach) {
+            if !excluded(bound, self.best[q as usize].squared_reach) {
                 self.try_point(q as usize, position as usize);
             }
         }
@@ -175,8 +177,8 @@ impl<'a> Block<'a> {
         Point { entries: self.scaled.row(row), norm: squared_norm.sqrt(), squared_norm }
     }
 
-    /// A first guess for every query: the most promising point of the leaf nearest to the block, or what the query
-    /// before it found.
+    /// A first guess for every query: the most promising point of the leaf nearest to the block, or what the
+    /// query before it found.
     fn seed(&mut self, scratch: &mut Scratch) {
         let shapes = &self.search.leaves.shapes;
         let distance = |leaf: usize| shapes[leaf].center_squared - 2.0 * scratch.products[leaf];
@@ -205,14 +207,13 @@ impl<'a> Block<'a> {
         for (leaf, (shape, product)) in self.search.leaves.shapes.iter().zip(&scratch.products).enumerate() {
             let distance = center.squared_norm + shape.center_squared - 2.0 * product;
             let reach = (shape.radius + farthest) * ROUND_UP;
-            // Written so that a NaN from an overflow keeps the leaf.
-            if distance - self.slack(center, shape) > reach * reach {
+            if excluded(distance - self.slack(center, shape), reach * reach) {
                 continue;
             }
             let placed =
                 self.place(center, shape, self.search.kernels.project_one(&shape.frame, center.entries));
             let bound = (box_bound(shape, &placed) - placed.slack).max(0.0).sqrt() / ROUND_UP;
-            if !(bound > farthest) {
+            if !excluded(bound, farthest) {
                 scratch.leaves.push((bound, leaf as u32));
             }
         }
@@ -229,22 +230,23 @@ impl<'a> Block<'a> {
             .fold(0.0, f32::max)
     }
 
-    /// Lets every query that may gain from `leaf` look at it; no point of the leaf is nearer to the block's centre than
-    /// `distance`.
+    /// Lets every query that may gain from `leaf` look at it; no point of the leaf is nearer to the block's
+    /// centre than `distance`.
     #[inline(always)]
     fn visit(&mut self, distance: f32, leaf: usize, scratch: &mut Scratch) {
         let shape = &self.search.leaves.shapes[leaf];
         let open = &mut scratch.open;
         open.clear();
         open.extend(
-            (0..self.exact.len()).filter(|&q| !(distance > (self.best[q].reach + self.spread[q]) * ROUND_UP)),
+            (0..self.exact.len())
+                .filter(|&q| !excluded(distance, (self.best[q].reach + self.spread[q]) * ROUND_UP)),
         );
         for group in open.chunks(GROUP) {
             let rows = std::array::from_fn(|i| self.scaled.row(group[i.min(group.len() - 1)]));
             let frames = self.search.kernels.project(&shape.frame, rows);
             for (&q, frame) in group.iter().zip(frames) {
                 let placed = self.place(self.point(q), shape, frame);
-                if !(box_bound(shape, &placed) - placed.slack > self.best[q].squared_reach) {
+                if !excluded(box_bound(shape, &placed) - placed.slack, self.best[q].squared_reach) {
                     self.scan(q, leaf, &placed, &mut scratch.bounds, &mut scratch.pending);
                 }
             }
@@ -281,7 +283,7 @@ impl<'a> Block<'a> {
         pending: &mut Vec<(u32, u32, f32)>,
     ) {
         let lowest = self.bound_points(&self.search.leaves.shapes[leaf], placed, bounds);
-        if lowest - placed.slack > self.best[q].squared_reach {
+        if excluded(lowest - placed.slack, self.best[q].squared_reach) {
             return;
         }
         let range = self.search.partition.ranges[leaf].clone();
@@ -291,7 +293,7 @@ impl<'a> Block<'a> {
         let limit = self.best[q].squared_reach;
         for (position, &bound) in range.zip(bounds.iter()) {
             let bound = bound - placed.slack;
-            if !(bound > limit) {
+            if !excluded(bound, limit) {
                 pending.push((q as u32, position as u32, bound));
             }
         }
@@ -308,6 +310,12 @@ impl<'a> Block<'a> {
             *best = Best { squared_distance, index, position, reach, squared_reach: squared };
         }
     }
+}
+
+/// Whether what is at least `bound` away lies beyond `limit`; never where an overflow has made either NaN.
+#[inline(always)]
+fn excluded(bound: f32, limit: f32) -> bool {
+    bound > limit
 }
 
 /// Lower bound of the squared distance to any point of the leaf, by the box of their coordinates.

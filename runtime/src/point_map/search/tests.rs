@@ -59,7 +59,8 @@ fn structureless_points_agree_with_double_loop() {
 
 #[test]
 fn ties_and_duplicates_go_to_the_lowest_index() {
-    // A small integer lattice, every point four times over; queries on the lattice and half way between its points.
+    // A small integer lattice, every point four times over; queries on the lattice and half way between its
+    // points.
     let targets = Matrix::from_fn(4 * 125, 3, |i, t| ((i % 125) / [1, 5, 25][t] % 5) as f64);
     let queries = Matrix::from_fn(729, 3, |i, t| (i / [1, 9, 81][t] % 9) as f64 / 2.0);
     let found = nearest_rows(&queries, &targets).unwrap();
