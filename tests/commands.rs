@@ -1,4 +1,5 @@
 //! The commands as a user runs them, on generated meshes.
+#![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use fmnet::io::{Attributes, read_matrix, read_mesh, read_point_map, read_vector, write_mesh};
 use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};

@@ -1,4 +1,5 @@
 //! The same SHOT descriptors through Candle, tract, onnxruntime in Rust, Python and JavaScript.
+#![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;
 use fmnet::Matrix;

@@ -185,7 +185,7 @@ impl<'a> Decoder<'a> {
     pub fn matrix<T: Pod>(&mut self) -> Option<crate::Matrix<T>> {
         let cols = usize::try_from(self.value::<u64>()?).ok()?;
         let data = self.slice::<T>()?;
-        let rows = if cols == 0 { 0 } else { data.len() / cols };
+        let rows = data.len().checked_div(cols).unwrap_or(0);
         (rows * cols == data.len()).then(|| crate::Matrix::from_vec(rows, cols, data))
     }
 

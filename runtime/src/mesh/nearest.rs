@@ -27,8 +27,8 @@ pub fn nearest_k_vertices(points: &[[f64; 3]], queries: &[[f64; 3]], count: usiz
     for query in queries {
         let found = tree.query(query).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
         let last = found.last().expect("there are points").item;
-        nearest.extend(found.iter().map(|n| n.item as u32));
-        nearest.extend((found.len()..count).map(|_| last as u32));
+        nearest.extend(found.iter().map(|n| n.item));
+        nearest.extend((found.len()..count).map(|_| last));
     }
     nearest
 }

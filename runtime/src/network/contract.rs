@@ -56,7 +56,7 @@ pub struct ModelMetadata {
 impl ModelMetadata {
     /// The settings of [`crate::shape::Shape::process`] that fit the model.
     pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot.clone() }
+        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot }
     }
 
     /// As key-value pairs for `metadata_props`.

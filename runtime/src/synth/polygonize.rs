@@ -9,6 +9,9 @@ use crate::mesh::vec3;
 use super::implicit::{Part, field};
 use super::math::Vec3;
 
+/// First vertex of each cell, edges on further sheets, positions.
+type BlockVertices = (Vec<u32>, Vec<(u16, u8, u32)>, Vec<Vec3>);
+
 /// Cells along each side of a block of the grid.
 const BLOCK: usize = 4;
 const CORNERS: usize = BLOCK + 1;
@@ -247,7 +250,7 @@ impl Grid {
     }
 
     /// The vertices of the cells of block `b`: first vertex of each cell, edges on further sheets, positions.
-    fn place_vertices(&self, blocks: &[Block], b: usize) -> (Vec<u32>, Vec<(u16, u8, u32)>, Vec<Vec3>) {
+    fn place_vertices(&self, blocks: &[Block], b: usize) -> BlockVertices {
         let (mut cells, mut further, mut vertices) = (Vec::new(), Vec::new(), Vec::new());
         let place = self.place(b);
         let values = self.corner_values(blocks, b);
@@ -255,13 +258,13 @@ impl Grid {
             return (cells, further, vertices);
         }
         cells = vec![NONE; BLOCK.pow(3)];
-        for c in 0..BLOCK.pow(3) {
+        for (c, first) in cells.iter_mut().enumerate() {
             let cell = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
             let corner = self.corner(place, cell);
             for (sheet, edges) in sheets(&values, cell).into_iter().enumerate() {
                 let vertex = vertices.len() as u32;
                 if sheet == 0 {
-                    cells[c] = vertex;
+                    *first = vertex;
                 } else {
                     further.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
                 }
