@@ -9,9 +9,6 @@ use crate::mesh::vec3;
 use super::implicit::{Part, field};
 use super::math::Vec3;
 
-/// First vertex of each cell, edges on further sheets, positions.
-type BlockVertices = (Vec<u32>, Vec<(u16, u8, u32)>, Vec<Vec3>);
-
 /// Cells along each side of a block of the grid.
 const BLOCK: usize = 4;
 const CORNERS: usize = BLOCK + 1;
@@ -39,11 +36,17 @@ struct Block {
     inside: bool,
     /// Values at its own corners, x fastest; empty where the surface does not pass.
     values: Vec<f64>,
-    /// First vertex of each cell, counted within the block, or `NONE`.
+    vertices: Vertices,
+}
+
+/// Where the surface crosses the cells of a block.
+#[derive(Default)]
+struct Vertices {
+    positions: Vec<Vec3>,
+    /// First vertex of each cell, or `NONE`; empty where the surface does not pass.
     cells: Vec<u32>,
     /// `(cell, edge, vertex)` for the edges on the further sheets of a cell.
     sheets: Vec<(u16, u8, u32)>,
-    vertices: Vec<Vec3>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -54,15 +57,13 @@ pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
     let mut blocks = grid.sample(parts);
     let n_blocks = blocks.len();
     let meshed: Vec<_> = (0..n_blocks).into_par_iter().map(|b| grid.place_vertices(&blocks, b)).collect();
-    for (block, (cells, sheets, vertices)) in blocks.iter_mut().zip(meshed) {
-        (block.cells, block.sheets, block.vertices) = (cells, sheets, vertices);
-    }
+    blocks.iter_mut().zip(meshed).for_each(|(block, vertices)| block.vertices = vertices);
     let mut first = Vec::with_capacity(n_blocks);
     let (mut vertices, mut block_of) = (Vec::new(), Vec::new());
     for (b, block) in blocks.iter().enumerate() {
         first.push(vertices.len() as u32);
-        vertices.extend_from_slice(&block.vertices);
-        block_of.extend(std::iter::repeat_n(b as u32, block.vertices.len()));
+        vertices.extend_from_slice(&block.vertices.positions);
+        block_of.extend(std::iter::repeat_n(b as u32, block.vertices.positions.len()));
     }
     let quads: Vec<Vec<[u32; 4]>> =
         (0..n_blocks).into_par_iter().map(|b| grid.quads(&blocks, &first, b)).collect();
@@ -249,30 +250,29 @@ impl Grid {
         (0..CORNERS.pow(3)).map(value).collect()
     }
 
-    /// The vertices of the cells of block `b`: first vertex of each cell, edges on further sheets, positions.
-    fn place_vertices(&self, blocks: &[Block], b: usize) -> BlockVertices {
-        let (mut cells, mut further, mut vertices) = (Vec::new(), Vec::new(), Vec::new());
+    /// The vertices of the cells of block `b`.
+    fn place_vertices(&self, blocks: &[Block], b: usize) -> Vertices {
+        let mut result = Vertices::default();
         let place = self.place(b);
         let values = self.corner_values(blocks, b);
         if values.iter().all(|&x| x < 0.0) || values.iter().all(|&x| x >= 0.0) {
-            return (cells, further, vertices);
+            return result;
         }
-        cells = vec![NONE; BLOCK.pow(3)];
-        for (c, first) in cells.iter_mut().enumerate() {
+        for c in 0..BLOCK.pow(3) {
             let cell = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
             let corner = self.corner(place, cell);
-            for (sheet, edges) in sheets(&values, cell).into_iter().enumerate() {
-                let vertex = vertices.len() as u32;
-                if sheet == 0 {
-                    *first = vertex;
-                } else {
-                    further.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
+            let sheets = sheets(&values, cell);
+            result.cells.push(if sheets.is_empty() { NONE } else { result.positions.len() as u32 });
+            for (sheet, edges) in sheets.into_iter().enumerate() {
+                if sheet > 0 {
+                    let vertex = result.positions.len() as u32;
+                    result.sheets.extend(edges.iter().map(|&edge| (c as u16, edge, vertex)));
                 }
                 let offset = mean_crossing(&values, cell, &edges);
-                vertices.push(std::array::from_fn(|axis| corner[axis] + self.cell * offset[axis]));
+                result.positions.push(std::array::from_fn(|i| corner[i] + self.cell * offset[i]));
             }
         }
-        (cells, further, vertices)
+        result
     }
 
     /// Parts whose distance at `center` is small enough to matter within `reach` of it.
@@ -287,7 +287,7 @@ impl Grid {
     /// The quadrilaterals around the crossed grid edges that start in block `b`, counter-clockwise from outside.
     fn quads(&self, blocks: &[Block], first: &[u32], b: usize) -> Vec<[u32; 4]> {
         let (block, place, mut quads) = (&blocks[b], self.place(b), Vec::new());
-        if block.cells.is_empty() {
+        if block.vertices.cells.is_empty() {
             return quads;
         }
         let values = self.corner_values(blocks, b);
@@ -321,8 +321,9 @@ impl Grid {
         let b = x + self.blocks[0] * (y + self.blocks[1] * z);
         let [i, j, k] = cell.map(|c| c % BLOCK);
         let c = i + BLOCK * (j + BLOCK * k);
-        let sheet = blocks[b].sheets.iter().find(|&&(cell, other, _)| (cell as usize, other) == (c, edge));
-        let local = sheet.map_or(*blocks[b].cells.get(c)?, |&(_, _, vertex)| vertex);
+        let sheet =
+            blocks[b].vertices.sheets.iter().find(|&&(cell, other, _)| (cell as usize, other) == (c, edge));
+        let local = sheet.map_or(*blocks[b].vertices.cells.get(c)?, |&(_, _, vertex)| vertex);
         (local != NONE).then(|| first[b] + local)
     }
 }

@@ -48,6 +48,11 @@ pub(super) fn remesh(
     Remeshed { dense, faces }
 }
 
+/// Collapses that make a triangle thinner than this, and than the triangles there were, are refused. Thinness is 1 for
+/// an equilateral triangle.
+const THINNEST: f64 = 6.0;
+/// A triangle thinner than this is a sliver, which a fold of the skin may leave.
+const SLIVER: f64 = 8.0;
 /// Marks a face that was collapsed.
 const GONE: u32 = u32::MAX;
 
@@ -162,38 +167,37 @@ impl<'a> Collapser<'a> {
     }
 
     /// Squared length in units of the wanted one, dearer where the surface bends or triangles get thin; `None` where a
-    /// triangle would turn over.
+    /// triangle would turn over or get too thin.
     fn cost(&self, vertex: u32, into: u32) -> Option<f64> {
         let (from, to) = (self.points[vertex as usize], self.points[into as usize]);
         let size = 0.5 * (self.sizes[vertex as usize] + self.sizes[into as usize]);
-        let mut thinness: f64 = 1.0;
+        let (mut thin_before, mut thin_after): (f64, f64) = (1.0, 1.0);
         let mut longest: f64 = 0.0;
         for &f in &self.rings[vertex as usize] {
             let face = self.faces[f as usize];
+            let next = follower(face, vertex);
+            let (q, r) = (self.points[next as usize], self.points[follower(face, next) as usize]);
+            let (before, thin) = normal_and_thinness(from, q, r);
+            thin_before = thin_before.max(thin);
             if face.contains(&into) {
                 continue;
             }
-            let next = follower(face, vertex);
-            let last = follower(face, next);
-            let (q, r) = (self.points[next as usize], self.points[last as usize]);
-            let edge = vec3::sub(r, q);
-            let before = vec3::cross(edge, vec3::sub(from, q));
-            let after = vec3::cross(edge, vec3::sub(to, q));
-            let (dot, squares) =
-                (vec3::dot(before, after), vec3::dot(before, before) * vec3::dot(after, after));
-            if dot <= 0.0 || dot * dot < 0.16 * squares {
+            let (after, thin_then) = normal_and_thinness(to, q, r);
+            // The direction of a sliver says nothing.
+            if thin < SLIVER && vec3::dot(before, after) < 0.4 {
                 return None;
             }
+            thin_after = thin_after.max(thin_then);
             let (a, b) = (vec3::sub(to, q), vec3::sub(to, r));
-            let lengths = vec3::dot(edge, edge) + vec3::dot(a, a) + vec3::dot(b, b);
             longest = longest.max(vec3::dot(a, a)).max(vec3::dot(b, b));
-            // 1 for an equilateral triangle, more for a thin one.
-            thinness = thinness.max(lengths / (2.0 * 3f64.sqrt() * vec3::norm(after)));
+        }
+        if thin_after > THINNEST.max(thin_before) {
+            return None;
         }
         let length = vec3::sub(to, from);
         let bend = self.quadrics[vertex as usize].mean_square_distance(to) / self.tolerance;
         let spread = (vec3::dot(length, length) + 0.3 * longest) / (size * size);
-        Some(spread * (1.0 + bend) * thinness)
+        Some(spread * (1.0 + bend) * thin_after * thin_after / thin_before)
     }
 
     fn collapse(&mut self, vertex: u32, into: u32) {
@@ -218,6 +222,15 @@ impl<'a> Collapser<'a> {
         }
         self.dirty[into as usize] = true;
     }
+}
+
+/// Unit normal of a triangle, and the sum of its squared sides over that of an equilateral triangle of the same area.
+fn normal_and_thinness(p: Vec3, q: Vec3, r: Vec3) -> (Vec3, f64) {
+    let (a, b, c) = (vec3::sub(q, p), vec3::sub(r, p), vec3::sub(r, q));
+    let cross = vec3::cross(a, b);
+    let double = vec3::norm(cross).max(1e-300);
+    let squares = vec3::dot(a, a) + vec3::dot(b, b) + vec3::dot(c, c);
+    (vec3::scale(cross, 1.0 / double), squares / (2.0 * 3f64.sqrt() * double))
 }
 
 /// The vertex after `vertex` in a face that has it.

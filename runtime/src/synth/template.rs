@@ -163,8 +163,8 @@ pub(super) fn vertex_normals(points: &[Vec3], faces: &[[u32; 3]]) -> Vec<Vec3> {
     normals.into_iter().map(super::math::unit).collect()
 }
 
-/// Vertices spread evenly over the body at rest: random ones, none nearer to another than a fixed distance, unless
-/// the two look in opposite directions (as on both sides of a finger).
+/// Vertices spread evenly over the body at rest: random ones, none nearer to another than a fixed distance, or half
+/// of it where the two look in opposite directions (as on both sides of a finger).
 fn landmarks(species: Species, rest: &[Vec3], normals: &[Vec3], faces: &[[u32; 3]]) -> Vec<u32> {
     let area: f64 = faces
         .iter()
@@ -184,7 +184,8 @@ fn landmarks(species: Species, rest: &[Vec3], normals: &[Vec3], faces: &[[u32; 3
         let [x, y, z] = cell_of(p);
         let clash = |&j: &u32| {
             let (q, other) = (rest[j as usize], normals[j as usize]);
-            vec3::distance(p, q) < radius && vec3::dot(normal, other) > 0.0
+            let limit = if vec3::dot(normal, other) > 0.0 { radius } else { 0.5 * radius };
+            vec3::distance(p, q) < limit
         };
         let around = (0..27).map(|c| [x + c % 3 - 1, y + (c / 3) % 3 - 1, z + c / 9 - 1]);
         if !around.into_iter().any(|cell| grid.get(&cell).is_some_and(|list| list.iter().any(clash))) {
