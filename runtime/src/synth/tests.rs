@@ -129,10 +129,11 @@ fn landmarks_are_the_same_template_points_and_the_ground_truth_hits_them() {
         assert_eq!(truth[i as usize], j);
     }
     let rest = template.rest_mesh();
+    let scale = rest.scale();
     let place = |body: &Body, i: u32| rest.vertices()[body.template_vertices[i as usize] as usize];
     for (i, &j) in truth.iter().enumerate() {
         assert_ne!(j, UNMATCHED, "vertex {i}");
-        let distance = vec3::distance(place(&a, i as u32), place(&b, j)) / rest.scale();
+        let distance = vec3::distance(place(&a, i as u32), place(&b, j)) / scale;
         assert!(distance < 0.04, "vertex {i} is {distance} from its match");
     }
     let points = template.ground_truth_points(&a, &b);
@@ -144,7 +145,7 @@ fn landmarks_are_the_same_template_points_and_the_ground_truth_hits_them() {
     for (i, point) in points.iter().enumerate() {
         let (p, sum) = exact(point.as_ref().unwrap());
         assert!((sum - 1.0).abs() < 1e-12);
-        let distance = vec3::distance(p, place(&a, i as u32)) / rest.scale();
+        let distance = vec3::distance(p, place(&a, i as u32)) / scale;
         assert!(distance < 0.012, "vertex {i} is {distance} from its point");
     }
 }
