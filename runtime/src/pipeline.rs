@@ -229,7 +229,7 @@ impl Matcher {
     ) -> Result<Match, Error> {
         let pair = format!("{} -> {}", source.shape.name, target.shape.name);
         let (basis_source, basis_target) =
-            (source.shape.basis.truncated(self.k), target.shape.basis.truncated(self.k));
+            (source.shape.basis.at_unit_area(self.k), target.shape.basis.at_unit_area(self.k));
         let (functional_map, functional_map_info) = timed(observer, &pair, "functional map", || {
             let (f, g) =
                 (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
@@ -262,7 +262,7 @@ impl Matcher {
             Refinement::None => Ok(raw),
             Refinement::Icp => {
                 let (basis_source, basis_target) =
-                    (source.basis.truncated(self.k), target.basis.truncated(self.k));
+                    (source.basis.at_unit_area(self.k), target.basis.at_unit_area(self.k));
                 let refined = timed(observer, pair, "icp", || {
                     icp(functional_map, &basis_source, &basis_target, &IcpOptions::default())
                 })?;
@@ -270,7 +270,8 @@ impl Matcher {
             }
             Refinement::Zoomout => {
                 let refined = timed(observer, pair, "zoomout", || {
-                    zoomout(&raw, &source.basis, &target.basis, &ZoomOutOptions::default())
+                    let whole = |shape: &Shape| shape.basis.at_unit_area(shape.basis.k());
+                    zoomout(&raw, &whole(source), &whole(target), &ZoomOutOptions::default())
                 })?;
                 Ok(refined.map)
             }
@@ -307,15 +308,15 @@ impl Matcher {
         Ok((map, info))
     }
 
-    /// The eigenbasis of the full mesh, `[n_full, UPSCALE_K]`.
+    /// The eigenbasis of the full mesh at unit area, `[n_full, UPSCALE_K]`.
     fn full_basis(&self, described: &DescribedShape, observer: Observer) -> Result<Eigenbasis, Error> {
         let shape = &described.shape;
         if shape.decimated.is_none() {
-            return Ok(shape.basis.truncated(UPSCALE_K.min(shape.basis.k())));
+            return Ok(shape.basis.at_unit_area(UPSCALE_K.min(shape.basis.k())));
         }
         let key = CacheKey::of(&[described.key.as_bytes(), &UPSCALE_K.to_le_bytes()]);
         if let Some(basis) = self.cache.as_ref().and_then(|cache| cached_basis(cache, key, observer)) {
-            return Ok(basis);
+            return Ok(basis.at_unit_area(basis.k()));
         }
         let (basis, _) = timed(observer, &shape.name, "full eigenbasis", || {
             eigenbasis(&Laplacian::new(&shape.full_mesh), UPSCALE_K, &EigenOptions::default())
@@ -326,7 +327,7 @@ impl Matcher {
             out.slice(&basis.eigenvalues).slice(&basis.mass).matrix(&basis.eigenvectors);
             cache.put("full-basis", key, &out.finish())?;
         }
-        Ok(basis)
+        Ok(basis.at_unit_area(basis.k()))
     }
 }
 

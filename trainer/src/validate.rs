@@ -75,7 +75,7 @@ impl<'a> Validation<'a> {
         solver: FmapSolver,
     ) -> anyhow::Result<Vec<f32>> {
         let (s, t) = (&self.shapes[source], &self.shapes[target]);
-        let (basis_source, basis_target) = (s.shape.basis.truncated(k), t.shape.basis.truncated(k));
+        let (basis_source, basis_target) = (s.shape.basis.at_unit_area(k), t.shape.basis.at_unit_area(k));
         let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
         let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
         let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;

@@ -42,6 +42,18 @@ impl Eigenbasis {
         }
     }
 
+    /// The first `k` eigenpairs of the shape scaled to unit area: eigenvalues, eigenvectors and mass without a unit.
+    ///
+    /// Functional maps are computed between such bases, so that a map does not depend on the size of either shape.
+    pub fn at_unit_area(&self, k: usize) -> Self {
+        let area: f64 = self.mass.iter().sum();
+        Self {
+            eigenvalues: self.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),
+            eigenvectors: self.eigenvectors.first_cols(k).map(|x| x * area.sqrt()),
+            mass: self.mass.iter().map(|m| m / area).collect(),
+        }
+    }
+
     /// Fourier coefficients `Phi^T A F`, `[k, q]`, of the functions `F`, `[n, q]`.
     ///
     /// Multi-threaded, the same bytes for any number of threads; `F` is converted to f64 block by block.
