@@ -1,5 +1,6 @@
 //! `fmnet-infer`: two meshes in, a dense map out.
 
+#[allow(rustdoc::broken_intra_doc_links, reason = "the comments are help texts, where [n] is a shape")]
 mod args;
 mod commands;
 mod console;

@@ -1,5 +1,6 @@
 //! `fmnet-train`: trains the descriptor network through the functional map and exports it.
 
+#[allow(rustdoc::broken_intra_doc_links, reason = "the comments are help texts, where [n] is a shape")]
 mod args;
 mod commands;
 mod progress;
