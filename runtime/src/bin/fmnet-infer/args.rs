@@ -84,7 +84,7 @@ pub(crate) struct PipelineArgs {
     /// How the map of decimated meshes becomes one of the full meshes
     #[arg(long, value_enum, default_value = "l21")]
     pub(crate) upscale: UpscaleArg,
-    /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.0673 with SHOT]
+    /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
     #[arg(long, value_parser = radius)]
     pub(crate) shot_radius: Option<f64>,
     /// Keep what is computed of each shape in this folder, and use what is there
