@@ -65,4 +65,14 @@ impl Error {
     pub fn in_shape(self, shape: &str) -> Self {
         Self::InShape { shape: shape.to_string(), source: Box::new(self) }
     }
+
+    /// Whether the program or the machine failed (a file that cannot be written, a solver that did not converge), rather than
+    /// the input or the options being wrong.
+    pub fn is_own_failure(&self) -> bool {
+        match self {
+            Self::InShape { source, .. } => source.is_own_failure(),
+            Self::Io(IoError::Write { .. }) | Self::Eigen(EigenError::NotConverged { .. }) => true,
+            _ => false,
+        }
+    }
 }

@@ -157,12 +157,6 @@ impl Shape {
         self.full_of_input.iter().map(work_of).collect()
     }
 
-    /// Eigenvalues times the area of the shape: free of the unit, `[k]`.
-    pub fn unitless_eigenvalues(&self) -> Vec<f64> {
-        let area: f64 = self.basis.mass.iter().sum();
-        self.basis.eigenvalues.iter().map(|lambda| lambda * area).collect()
-    }
-
     fn encode(&self) -> Vec<u8> {
         let mut out = Encoder::default();
         out.value(self.n_input as u64);

@@ -2,6 +2,7 @@
 
 use crate::args::Common;
 use fmnet::events::Event;
+use fmnet::io::IoError;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
@@ -16,11 +17,6 @@ pub(crate) struct Console {
     spinner: Option<ProgressBar>,
     stages: Mutex<Vec<Value>>,
 }
-
-/// A failure of the program itself, not of its input.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub(crate) struct InternalError(pub(crate) String);
 
 impl Console {
     pub(crate) fn new(common: &Common) -> Self {
@@ -95,9 +91,12 @@ impl Console {
     }
 }
 
-/// 1 for a failure of the program itself, 2 for bad input.
+/// 1 where the program or the machine failed (a file that cannot be written, a solver that did not converge), 2 for bad usage
+/// or bad input.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
-    if error.is::<InternalError>() { ExitCode::from(1) } else { ExitCode::from(2) }
+    let unwritable = matches!(error.downcast_ref(), Some(IoError::Write { .. }));
+    let failed = unwritable || error.downcast_ref::<fmnet::Error>().is_some_and(fmnet::Error::is_own_failure);
+    ExitCode::from(if failed { 1 } else { 2 })
 }
 
 /// Ctrl-C and termination end the program after removing half-written files.
