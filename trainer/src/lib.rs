@@ -14,6 +14,7 @@ pub mod optimizer;
 pub mod precompute;
 mod projection;
 pub mod sampler;
+pub mod simulate;
 pub mod soft_map;
 pub mod step;
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! successors of the paper do. TOSCA: one group for each class, every fifth shape validation.
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split, shrec16};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Vertices of a FAUST registration: in remeshed shapes of more vertices these come first.
@@ -70,10 +71,16 @@ fn faust_scans(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
 }
 
 fn faust_split(index: usize) -> Split {
-    match index {
-        0..60 => Split::Train,
-        60..80 => Split::Validation,
-        _ => Split::Test,
+    let splits = [Split::Train, Split::Validation, Split::Test];
+    splits.into_iter().find(|&split| faust_numbers(split).contains(&index)).unwrap_or(Split::Test)
+}
+
+/// The numbers that a split has in FAUST.
+pub(crate) fn faust_numbers(split: Split) -> Range<usize> {
+    match split {
+        Split::Train => 0..60,
+        Split::Validation => 60..80,
+        Split::Test => 80..1000,
     }
 }
 

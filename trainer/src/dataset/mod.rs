@@ -8,8 +8,12 @@ mod layouts;
 pub mod manifest;
 mod shrec16;
 
+pub(crate) use layouts::faust_numbers;
+pub(crate) use shrec16::TRAINING_PARTS;
+
 use fmnet::Mesh;
 use fmnet::io::{IoError, read_mesh, read_point_map};
+use fmnet::mesh::vec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -35,7 +39,8 @@ pub enum Correspondence {
     First(usize),
     /// Line `i` of a `.vts` file holds the 1-based vertex of point `i`, 0 where the shape lacks it.
     Vts(PathBuf),
-    /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place.
+    /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place; the shape lacks
+    /// it where none is within 0.02 sqrt(area of the template), as in a hole of a scan.
     NearestTo(PathBuf),
     /// Line `v` of a SHREC'16 `.baryc_gt` file says where vertex `v` lies on the whole shape (the second path).
     Barycentric(PathBuf, PathBuf),
@@ -154,11 +159,27 @@ impl ShapeEntry {
             Correspondence::Vts(path) => vts_points(path, n),
             Correspondence::NearestTo(path) => {
                 let template = read_mesh(path)?.mesh;
-                Ok(fmnet::mesh::nearest_vertices(mesh.vertices(), template.vertices()))
+                if mesh.n_vertices() == 0 {
+                    return Ok(vec![MISSING; template.n_vertices()]);
+                }
+                Ok(nearest_points(mesh, &template))
             }
-            Correspondence::Barycentric(path, whole) => shrec16::points(path, whole),
+            Correspondence::Barycentric(path, whole) => shrec16::points(path, whole, n),
         }
     }
+}
+
+/// Vertices of a scan farther than this from a vertex of its registration do not show it, relative to sqrt(area).
+const NEAR: f64 = 0.02;
+
+fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
+    let limit = NEAR * template.scale();
+    let nearest = fmnet::mesh::nearest_vertices(mesh.vertices(), template.vertices());
+    let near = |(&p, v): (&[f64; 3], u32)| match vec3::distance(p, mesh.vertices()[v as usize]) <= limit {
+        true => v,
+        false => MISSING,
+    };
+    template.vertices().iter().zip(nearest).map(near).collect()
 }
 
 fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {

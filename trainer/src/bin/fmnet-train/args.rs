@@ -2,6 +2,8 @@
 
 use clap::{Args, Parser, Subcommand};
 use fmnet_trainer::config::{TrainConfig, TrainOverrides};
+use fmnet_trainer::dataset::Split;
+use fmnet_trainer::simulate::{PartOptions, ScanOptions};
 use std::path::PathBuf;
 
 /// Trains the descriptor network of fmnet through the functional map, and exports it to ONNX.
@@ -38,6 +40,8 @@ pub(crate) struct Common {
 pub(crate) enum Command {
     /// Generate a dataset of deforming bodies with exact ground truth
     Synth(SynthArgs),
+    /// Make stand-ins for scans, or parts of a whole, from registered shapes; an interrupted run goes on where it was
+    Simulate(SimulateArgs),
     /// Compute eigenbases, SHOT and geodesic distances of a dataset once; an interrupted run goes on where it was
     Preprocess(PreprocessArgs),
     /// Train a network, or go on training it: the same command again resumes from the last checkpoint
@@ -71,6 +75,55 @@ pub(crate) struct SynthArgs {
     /// Noise on the vertices, relative to the mean edge length, 0 to 0.5
     #[arg(long, default_value_t = 0.0)]
     pub(crate) noise: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    #[command(subcommand)]
+    pub(crate) what: Simulated,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Simulated {
+    /// What a 3D scanner would have made of registered shapes, in the layout of the FAUST scans
+    ///
+    /// Writes OUT/scans/tr_scan_NNN.ply and OUT/registrations/tr_reg_NNN.ply, which `preprocess` and `train` take like real
+    /// scans. Each scan lies where its registration lies and has a triangulation of its own. Parts that nearly touch are
+    /// glued, some of what no camera sees is missing, and there are holes, noise and stray pieces.
+    ///
+    /// For scans as the paper trains on them:
+    ///
+    ///   fmnet-train simulate scans FAUST/registrations data/scans
+    ///   fmnet-train train --dataset data/scans --out runs/scans -k 70 --sampling area --jitter 10
+    #[command(verbatim_doc_comment)]
+    Scans {
+        /// Registrations to scan: a folder of closed shapes that correspond vertex by vertex, such as FAUST's or SCAPE's
+        dataset: PathBuf,
+        /// Folder for the scans
+        out: PathBuf,
+        /// Splits of the dataset to scan, separated by commas
+        #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Split::Train, Split::Validation, Split::Test])]
+        splits: Vec<Split>,
+        #[command(flatten)]
+        options: ScanOptions,
+    },
+    /// Parts of a whole with holes or cut by a plane, in the layout of the SHREC'16 partial correspondence benchmark
+    ///
+    /// Writes OUT/null/CLASS.off, the whole, and OUT/holes/holes_CLASS_shape_N.off with .baryc_gt (where on the whole each
+    /// vertex lies), likewise OUT/cuts. Each class of the dataset needs three poses: the first is the whole; parts 1 to 10,
+    /// for training, and the parts after them, for testing, are cut out of different ones.
+    ///
+    ///   fmnet-train simulate parts TOSCA/dog data/dog-parts
+    ///   fmnet-train train --dataset data/dog-parts --out runs/dog -k 100 --steps 1000
+    #[command(verbatim_doc_comment)]
+    Parts {
+        /// Poses to cut: a folder of shapes that correspond vertex by vertex within each class, such as TOSCA's
+        dataset: PathBuf,
+        /// Folder for the parts
+        out: PathBuf,
+        #[command(flatten)]
+        options: PartOptions,
+    },
 }
 
 #[derive(Debug, Args)]

@@ -22,6 +22,7 @@ fn main() -> ExitCode {
     }
     let outcome = match cli.command {
         Command::Synth(args) => commands::synth::run(&args, &cli.common),
+        Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Preprocess(args) => commands::preprocess::run(&args, &cli.common),
         Command::Train(args) => commands::train::run(*args, &cli.common),
         Command::Export(args) => commands::export::run(&args, &cli.common),

@@ -1,0 +1,29 @@
+//! `fmnet-train simulate`.
+
+use crate::args::{Common, SimulateArgs, Simulated};
+use crate::progress::Progress;
+use anyhow::Result;
+use fmnet_trainer::dataset::Dataset;
+use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::simulate::{write_parts, write_scans};
+use serde_json::json;
+
+pub(crate) fn run(args: &SimulateArgs, common: &Common) -> Result<()> {
+    let progress = Progress::new(common);
+    let tell = |done, total, name: &str| {
+        progress.event(TrainEvent::Prepared { done, total, shape: name.into() });
+    };
+    let (out, what, count) = match &args.what {
+        Simulated::Scans { dataset, out, splits, options } => {
+            (out, "scans", write_scans(&Dataset::open(dataset)?, splits, out, options, &tell)?)
+        }
+        Simulated::Parts { dataset, out, options } => {
+            (out, "parts", write_parts(&Dataset::open(dataset)?, out, options, &tell)?)
+        }
+    };
+    progress.say(&format!("{count} {what} in {}", out.display()));
+    if common.json {
+        println!("{:#}", json!({ "folder": out, what: count }));
+    }
+    Ok(())
+}

@@ -1,0 +1,46 @@
+//! An output folder that knows what is written into it, so that an interrupted run can go on.
+
+use super::SimulateError;
+use fmnet::Mesh;
+use fmnet::io::{Attributes, IoError, write_atomically, write_mesh};
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Tells what was simulated, and how.
+const RECORD: &str = "simulation.toml";
+
+#[derive(Serialize)]
+struct Record<'a, O> {
+    kind: &'a str,
+    dataset: String,
+    options: &'a O,
+}
+
+/// Makes the folder with its subfolders, or goes on in one that was begun with the same dataset and options.
+pub(super) fn claim<O: Serialize>(
+    out: &Path,
+    subfolders: &[&str],
+    kind: &str,
+    dataset: &Path,
+    options: &O,
+) -> Result<(), SimulateError> {
+    let dataset = fs::canonicalize(dataset).unwrap_or_else(|_| dataset.to_path_buf());
+    let dataset = dataset.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let record = toml::to_string(&Record { kind, dataset, options }).expect("plain data serialises");
+    let path = out.join(RECORD);
+    match fs::read_to_string(&path) {
+        Ok(found) if found != record => return Err(SimulateError::OtherSimulation { path }),
+        _ => {}
+    }
+    for subfolder in subfolders {
+        let folder = out.join(subfolder);
+        fs::create_dir_all(&folder).map_err(|source| IoError::Write { path: folder, source })?;
+    }
+    Ok(write_atomically(&path, |file| file.write_all(record.as_bytes()))?)
+}
+
+/// Writes a mesh without attributes.
+pub(super) fn save(path: &PathBuf, mesh: &Mesh) -> Result<(), SimulateError> {
+    Ok(write_mesh(path, mesh, &Attributes::default())?)
+}
