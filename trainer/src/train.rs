@@ -19,7 +19,7 @@ use fmnet::io::{IoError, write_atomically};
 use rayon::prelude::*;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
@@ -85,6 +85,12 @@ pub enum TrainError {
     /// Candle failed.
     #[error(transparent)]
     Tensor(#[from] candle_core::Error),
+}
+
+/// The checkpoint of a run's folder that its model is made of: the best validated one, the last where nothing was validated.
+pub fn best_checkpoint(run: &Path) -> PathBuf {
+    let best = run.join(BEST);
+    if best.is_file() { best } else { run.join(LAST) }
 }
 
 /// How a run ended.

@@ -85,6 +85,38 @@ pub fn curves_csv(curves: &[(&str, &ErrorCurve)]) -> String {
     csv
 }
 
+/// Reads curves as [`curves_csv`] writes them: name and curve of each column. Lines start with a threshold; percentages follow.
+pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> {
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let (_, header) = lines.next().ok_or("no header")?;
+    let names: Vec<String> =
+        header.split(',').skip(1).map(|name| name.trim_matches('"').to_string()).collect();
+    if names.is_empty() {
+        return Err("line 1: expected threshold,NAME,...".into());
+    }
+    let mut curves = vec![ErrorCurve { thresholds: Vec::new(), shares: Vec::new() }; names.len()];
+    for (index, line) in lines {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let number = |cell: &str| {
+            cell.parse::<f64>().map_err(|_| format!("line {}: {cell:?} is no number", index + 1))
+        };
+        if cells.len() != names.len() + 1 {
+            return Err(format!(
+                "line {}: {} columns, but the header has {}",
+                index + 1,
+                cells.len(),
+                names.len() + 1
+            ));
+        }
+        let threshold = number(cells[0])?;
+        for (curve, cell) in curves.iter_mut().zip(&cells[1..]).filter(|(_, cell)| !cell.is_empty()) {
+            curve.thresholds.push(threshold);
+            curve.shares.push(number(cell)? / 100.0);
+        }
+    }
+    Ok(names.into_iter().zip(curves).collect())
+}
+
 fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -127,5 +159,8 @@ mod tests {
         let theirs = ErrorCurve::new(&[0.0], vec![0.0]);
         let csv = curves_csv(&[("ours", &ours), ("theirs, raw", &theirs)]);
         assert_eq!(csv, "threshold,ours,\"theirs, raw\"\n0,50.0000,100.0000\n0.003,100.0000,\n");
+        let read = curves_from_csv(&csv.replace("theirs, raw", "theirs")).unwrap();
+        assert_eq!(read, [("ours".to_string(), ours), ("theirs".to_string(), theirs)]);
+        assert!(curves_from_csv("threshold,a\n0,x\n").unwrap_err().contains("line 2"));
     }
 }

@@ -18,7 +18,7 @@ mod summary;
 
 pub use chart::{LineChart, Series, XScale};
 pub use cmc::{cmc_curve, correct_match_distances, match_ranks};
-pub use curve::{ErrorCurve, curves_csv};
+pub use curve::{ErrorCurve, curves_csv, curves_from_csv};
 pub use geodesic_error::{SymmetricErrors, geodesic_errors, symmetric_geodesic_errors};
 pub use ground_truth::{GroundTruth, GroundTruthSource};
 pub use histogram::Histogram;

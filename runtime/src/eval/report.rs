@@ -47,9 +47,9 @@ pub struct HtmlReport {
     pub sections: Vec<Section>,
 }
 
-const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#222;max-width:60rem;margin:2rem auto;padding:0 1rem}\
-h1,h2{line-height:1.2}table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums}\
-th,td{padding:.3rem .8rem;border-bottom:1px solid #ddd;text-align:right}\
+const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#222;max-width:64rem;margin:2rem auto;padding:0 1rem}\
+h1,h2{line-height:1.2}table{border-collapse:collapse;margin:1rem 0;font-size:.85em;font-variant-numeric:tabular-nums}\
+th,td{padding:.3rem .5rem;border-bottom:1px solid #ddd;text-align:right}\
 th:first-child,td:first-child{text-align:left}figure{margin:1rem 0}svg,img{max-width:100%;height:auto}\
 figcaption{color:#555;font-size:.9em}";
 

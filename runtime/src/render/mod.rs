@@ -1,11 +1,13 @@
-//! Pictures and attributes: colours of a map, the coloured pair, transfer, the HTML viewer.
+//! Pictures and attributes: colours of a map, the coloured pair, its picture, transfer, the HTML viewer.
 
 mod colormap;
 mod pair;
+mod picture;
 mod transfer;
 mod viewer;
 
 pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
 pub use pair::side_by_side;
+pub use picture::{Picture, pair_picture, picture};
 pub use transfer::{Donors, transfer_attributes, transfer_landmarks, transfer_values};
 pub use viewer::{ViewerPair, viewer_html};

@@ -100,7 +100,7 @@ fn tosca_shape(mesh: PathBuf) -> ShapeEntry {
 }
 
 /// The mesh files directly in a folder, sorted by name.
-pub(super) fn mesh_files(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+pub(crate) fn mesh_files(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let wrong = |source| DatasetError::Folder { path: folder.to_path_buf(), source };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(wrong)? {

@@ -8,7 +8,7 @@ mod layouts;
 pub mod manifest;
 mod shrec16;
 
-pub(crate) use layouts::faust_numbers;
+pub(crate) use layouts::{faust_numbers, mesh_files};
 pub(crate) use shrec16::TRAINING_PARTS;
 
 use fmnet::Mesh;
@@ -180,6 +180,15 @@ fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
         false => MISSING,
     };
     template.vertices().iter().zip(nearest).map(near).collect()
+}
+
+impl ShapeEntry {
+    /// The vertex of the left-right mirror image of every point, where a file `NAME.sym.vts` beside `NAME.vts` says.
+    pub fn mirrored_points(&self, mesh: &Mesh) -> Result<Option<Vec<u32>>, DatasetError> {
+        let Correspondence::Vts(path) = &self.correspondence else { return Ok(None) };
+        let mirrored = path.with_extension("sym.vts");
+        if mirrored.is_file() { vts_points(&mirrored, mesh.n_vertices()).map(Some) } else { Ok(None) }
+    }
 }
 
 fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {

@@ -5,9 +5,10 @@
 
 mod graph;
 
+use crate::checkpoint::Checkpoint;
 use crate::network::{Network, Normalization};
 use fmnet::io::{IoError, write_atomically};
-use fmnet::network::contract::{INPUT, ModelMetadata, OUTPUT, WIDTH};
+use fmnet::network::contract::{FORMAT_VERSION, INPUT, ModelMetadata, OUTPUT, WIDTH};
 use graph::GraphBuilder;
 use prost::Message;
 use std::path::Path;
@@ -28,6 +29,46 @@ pub enum ExportError {
     /// The parameters cannot be read from the device.
     #[error(transparent)]
     Tensor(#[from] candle_core::Error),
+}
+
+/// Where a model comes from, for its metadata.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelOrigin {
+    /// What it was trained on; `None`: the names of the dataset folders.
+    pub training_set: Option<String>,
+    /// Licence of the weights.
+    pub license: String,
+    /// Revision of the source.
+    pub commit: String,
+}
+
+impl Default for ModelOrigin {
+    fn default() -> Self {
+        Self { training_set: None, license: "unspecified".into(), commit: env!("CARGO_PKG_VERSION").into() }
+    }
+}
+
+/// The metadata of a checkpoint's model.
+pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata {
+    let config = &checkpoint.config;
+    let shape = config.shape_options();
+    let folder_name = |folder: &String| {
+        Path::new(folder).file_name().map_or(folder.clone(), |name| name.to_string_lossy().into_owned())
+    };
+    let datasets = || config.dataset.0.iter().map(folder_name).collect::<Vec<_>>().join(", ");
+    ModelMetadata {
+        format_version: FORMAT_VERSION,
+        shot: shape.shot,
+        k: shape.k,
+        solver: config.runtime_solver(),
+        decimate: shape.decimate,
+        per_shape_statistics: config.normalization == Normalization::PerShape,
+        training_set: origin.training_set.clone().unwrap_or_else(datasets),
+        seed: config.seed,
+        steps: checkpoint.step,
+        commit: origin.commit.clone(),
+        license: origin.license.clone(),
+    }
 }
 
 /// Writes a model file.

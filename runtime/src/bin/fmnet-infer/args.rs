@@ -107,7 +107,7 @@ pub(crate) struct MatchArgs {
     pub(crate) target: PathBuf,
     /// Output; may be given several times. The extension decides: .txt (one 0-based target vertex a line, -1 where
     /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence), .ply or .glb (both meshes side by
-    /// side, coloured alike where they match), .html (viewer)
+    /// side, coloured alike where they match), .png (a picture of that), .html (viewer)
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
     /// Write the functional map, [k of target, k of source]
@@ -195,7 +195,7 @@ pub(crate) struct EvaluateArgs {
     /// Second ground truth, the left-right mirrored one; the better of the two counts
     #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
     pub(crate) symmetric_ground_truth: Option<String>,
-    /// Output: .csv (curve) or .svg (plot); may be given several times
+    /// Output: .csv (curve), .svg (plot) or .html (report with pictures); may be given several times
     #[arg(short, long = "output")]
     pub(crate) outputs: Vec<PathBuf>,
 }

@@ -1,6 +1,7 @@
 //! The command line.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use fmnet::pipeline::Refinement;
 use fmnet_trainer::config::{TrainConfig, TrainOverrides};
 use fmnet_trainer::dataset::Split;
 use fmnet_trainer::simulate::{PartOptions, ScanOptions};
@@ -48,6 +49,10 @@ pub(crate) enum Command {
     Train(Box<TrainArgs>),
     /// Write a checkpoint's network as a model file
     Export(ExportArgs),
+    /// Match pairs of a dataset with one or several models, compare with the ground truth: tables, plots, a report
+    Evaluate(EvaluateArgs),
+    /// Run one of the paper's experiments end to end: generate, train, test, report; run again, it goes on where it was
+    Reproduce(ReproduceArgs),
 }
 
 #[derive(Debug, Args)]
@@ -169,6 +174,103 @@ pub(crate) struct ExportArgs {
     /// Source revision, for the metadata
     #[arg(long, default_value = env!("CARGO_PKG_VERSION"))]
     pub(crate) commit: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// A dataset folder (see `fmnet-train preprocess --help` for the layouts)
+    pub(crate) dataset: PathBuf,
+    /// Folder for report.html, summary.csv, pairs.csv, curves.csv, the plots (.svg) and the maps
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Model files to compare, or `embedded`, with a name for the tables if wanted; may be given several times
+    #[arg(long = "model", value_name = "[NAME=]FILE")]
+    pub(crate) models: Vec<String>,
+    /// Compare SHOT without a network as well
+    #[arg(long)]
+    pub(crate) shot: bool,
+    /// Compare the map files of another method as well: its name and the folder of SOURCE__TARGET.txt (.vts, .npy,
+    /// .csv); may be given several times
+    #[arg(long = "maps", value_name = "NAME=DIR", value_parser = named_folder)]
+    pub(crate) maps: Vec<(String, PathBuf)>,
+    /// Refinements to compare, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "none,zoomout")]
+    pub(crate) refine: Vec<RefineArg>,
+    /// Splits that pairs are drawn from, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "test")]
+    pub(crate) splits: Vec<Split>,
+    /// Number of random pairs, 1 and up, or a file with the names of source and target on each line
+    #[arg(long, value_name = "N|FILE", default_value = "20")]
+    pub(crate) pairs: String,
+    /// Seed of the random pairs
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Count a left-right mirrored map as right, where the dataset knows the mirrored ground truth
+    #[arg(long)]
+    pub(crate) symmetric: bool,
+    /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
+    #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub(crate) k: Option<u16>,
+    /// Weight of the mask of the regularised solver, 0 and up; more suits shapes of unlike connectivity [default: the model's]
+    #[arg(long)]
+    pub(crate) mask_weight: Option<f64>,
+    /// Curves of others to draw beside: a header `threshold,NAME,...`, then percentages
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) curves: Option<PathBuf>,
+    /// Keep what is computed of each shape in this folder, and use what is there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArgs {
+    /// The experiment
+    #[arg(value_parser = fmnet_trainer::reproduce::NAMES)]
+    pub(crate) experiment: String,
+    /// Folder of the research data: faust/registrations, faust/remeshed_5k, faust/scans_7k, scape, tosca/dog
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Folder of trainings and reports, shared by all experiments
+    #[arg(long, value_name = "DIR", default_value = "runs/reproduce")]
+    pub(crate) out: PathBuf,
+    /// Minibatches of each training [default: as many as in the paper, hours to days on a CPU]
+    #[arg(long)]
+    pub(crate) steps: Option<u64>,
+    /// Pairs of each test, where the data has no list of them
+    #[arg(long, default_value_t = 20)]
+    pub(crate) pairs: usize,
+    /// Curves of others to draw beside: a header `threshold,NAME,...`, then percentages
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) curves: Option<PathBuf>,
+    /// Train on the first NVIDIA GPU (needs the feature `cuda`)
+    #[arg(long)]
+    pub(crate) cuda: bool,
+}
+
+/// Refinement of a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RefineArg {
+    None,
+    Icp,
+    Zoomout,
+}
+
+impl RefineArg {
+    /// The library's option and what labels call it.
+    pub(crate) fn refinement(self) -> (Refinement, &'static str) {
+        match self {
+            Self::None => (Refinement::None, ""),
+            Self::Icp => (Refinement::Icp, " + ICP"),
+            Self::Zoomout => (Refinement::Zoomout, " + ZoomOut"),
+        }
+    }
+}
+
+fn named_folder(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, folder)) if !name.is_empty() && !folder.is_empty() => Ok((name.into(), folder.into())),
+        _ => Err("expected NAME=DIR".into()),
+    }
 }
 
 fn positive(text: &str) -> Result<usize, String> {

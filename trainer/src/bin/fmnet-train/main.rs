@@ -26,6 +26,8 @@ fn main() -> ExitCode {
         Command::Preprocess(args) => commands::preprocess::run(&args, &cli.common),
         Command::Train(args) => commands::train::run(*args, &cli.common),
         Command::Export(args) => commands::export::run(&args, &cli.common),
+        Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
+        Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,10 +1,12 @@
 //! Progress on a terminal, plain lines elsewhere.
 
 use crate::args::Common;
+use fmnet::events::Event;
 use fmnet_trainer::events::TrainEvent;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Steps between plain lines.
 const LINE_EVERY: u64 = 50;
@@ -59,6 +61,36 @@ impl Progress {
             )),
             TrainEvent::Checkpoint { .. } => {}
             TrainEvent::Warning { text } => self.print(&format!("warning: {text}")),
+        }
+    }
+
+    /// Shows a stage of the runtime's or of an evaluation.
+    pub(crate) fn stage(&self, event: Event) {
+        match event {
+            Event::Started { .. } => {}
+            Event::Finished { subject, stage, seconds } => {
+                self.say(&format!("{subject}: {stage}, {seconds:.2} s"));
+            }
+            Event::Warning(text) => self.print(&format!("warning: {text}")),
+        }
+    }
+
+    /// An observer that counts finished stages up to `total`.
+    pub(crate) fn counting(&self, total: usize) -> impl Fn(Event) + Sync {
+        let done = AtomicUsize::new(0);
+        move |event| match (&self.bar, event) {
+            (Some(bar), Event::Finished { subject, .. }) => {
+                self.at(done.fetch_add(1, Ordering::Relaxed) as u64 + 1, total as u64);
+                bar.set_message(subject);
+            }
+            (_, event) => self.stage(event),
+        }
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
         }
     }
 

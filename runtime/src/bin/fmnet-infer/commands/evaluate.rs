@@ -7,17 +7,23 @@ use crate::console::Console;
 use anyhow::{Result, bail};
 use fmnet::Mesh;
 use fmnet::eval::{
-    ErrorCurve, ErrorSummary, GroundTruth, GroundTruthSource, LineChart, curves_csv, geodesic_errors,
-    symmetric_geodesic_errors,
+    Block, ErrorCurve, ErrorSummary, GroundTruth, GroundTruthSource, HtmlReport, LineChart, Section,
+    curves_csv, geodesic_errors, symmetric_geodesic_errors,
 };
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::io::{read_point_map, write_atomically};
+use fmnet::point_map::PointMap;
+use fmnet::render::pair_picture;
 use serde_json::{Value, json};
 use std::path::Path;
+
+/// Columns of a picture in a report.
+const PICTURE_WIDTH: usize = 900;
 
 /// One map with what came of it.
 struct Evaluated {
     name: String,
+    map: PointMap,
     curve: ErrorCurve,
     summary: ErrorSummary,
     mirrored: bool,
@@ -38,6 +44,8 @@ pub(crate) fn run(args: &EvaluateArgs, console: &Console) -> Result<()> {
     for path in &args.outputs {
         let text = if has_extension(path, "svg") {
             LineChart::error_curves("", &curves).to_svg()
+        } else if has_extension(path, "html") {
+            report(&results, &curves, (&args.source, &source), (&args.target, &target))?
         } else {
             curves_csv(&curves)
         };
@@ -66,7 +74,38 @@ fn evaluate(
         }
     };
     let (curve, summary) = (ErrorCurve::princeton(&errors), ErrorSummary::new(&errors, area));
-    Ok(Evaluated { name: file_name(path), curve, summary, mirrored })
+    Ok(Evaluated { name: file_name(path), map, curve, summary, mirrored })
+}
+
+/// A page with the figures, the curves and a picture of each map.
+fn report(
+    results: &[Evaluated],
+    curves: &[(&str, &ErrorCurve)],
+    (path_source, source): (&Path, &Mesh),
+    (path_target, target): (&Path, &Mesh),
+) -> Result<String> {
+    let header = ["map", "mean x 100", "exact %", "within 0.05 %", "AUC", "worst x 100", "coverage %"];
+    let row = |r: &Evaluated| {
+        let s = &r.summary;
+        let shares = [s.mean, s.exact, s.within_005].map(|x| format!("{:.2}", 100.0 * x));
+        let rest = [
+            format!("{:.4}", s.auc),
+            format!("{:.1}", 100.0 * s.worst),
+            format!("{:.1}", 100.0 * s.coverage),
+        ];
+        std::iter::once(r.name.clone()).chain(shares).chain(rest).collect()
+    };
+    let mut blocks = vec![
+        Block::Table { header: header.map(String::from).to_vec(), rows: results.iter().map(row).collect() },
+        Block::Svg(LineChart::error_curves("", curves).to_svg()),
+    ];
+    for result in results {
+        let picture = pair_picture(source, target, &result.map, PICTURE_WIDTH)?;
+        let caption = format!("{}: each source vertex (left) has the colour of its match", result.name);
+        blocks.push(Block::Image { media_type: "image/png".into(), bytes: picture.to_png(), caption });
+    }
+    let title = format!("{} → {}", file_name(path_source), file_name(path_target));
+    Ok(HtmlReport { sections: vec![Section { title: title.clone(), blocks }], title }.to_html())
 }
 
 fn load(text: &str, source: &Mesh, target: &Mesh) -> Result<GroundTruth> {
@@ -84,8 +123,11 @@ fn record(result: &Evaluated) -> Value {
 
 fn check_outputs(args: &EvaluateArgs) -> Result<()> {
     for path in &args.outputs {
-        if !has_extension(path, "svg") && !has_extension(path, "csv") {
-            bail!("{}: unknown kind of output; use .csv for the curve or .svg for the plot", path.display());
+        if !["csv", "svg", "html"].iter().any(|e| has_extension(path, e)) {
+            bail!(
+                "{}: unknown kind of output; use .csv for the curve, .svg for the plot or .html for a report",
+                path.display()
+            );
         }
     }
     Ok(())

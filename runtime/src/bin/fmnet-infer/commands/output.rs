@@ -4,7 +4,7 @@ use anyhow::{Context, Result, bail};
 use fmnet::Mesh;
 use fmnet::io::{PointMapFormat, write_atomically, write_mesh, write_point_map};
 use fmnet::point_map::PointMap;
-use fmnet::render::{ViewerPair, side_by_side, viewer_html};
+use fmnet::render::{ViewerPair, pair_picture, side_by_side, viewer_html};
 use std::path::Path;
 
 /// A map with its two meshes and what people should read beside it.
@@ -21,8 +21,12 @@ pub(crate) struct MapOutput<'a> {
 enum Kind {
     Map,
     ColoredPair,
+    Picture,
     Viewer,
 }
+
+/// Columns of a picture of a pair.
+const PICTURE_WIDTH: usize = 1200;
 
 fn kind(path: &Path) -> Result<Kind> {
     if PointMapFormat::from_path(path).is_some() {
@@ -30,9 +34,10 @@ fn kind(path: &Path) -> Result<Kind> {
     }
     match path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).as_deref() {
         Some("ply" | "glb" | "off" | "obj") => Ok(Kind::ColoredPair),
+        Some("png") => Ok(Kind::Picture),
         Some("html") => Ok(Kind::Viewer),
         _ => bail!(
-            "{}: unknown kind of output; use {} for a map, .ply or .glb for the coloured pair, .html for the viewer",
+            "{}: unknown kind of output; use {} for a map, .ply or .glb for the coloured pair, .png for its picture, .html for the viewer",
             path.display(),
             PointMapFormat::EXTENSIONS
         ),
@@ -59,6 +64,11 @@ pub(crate) fn write(path: &Path, output: &MapOutput) -> Result<()> {
             let (mesh, attributes) = side_by_side(output.source, output.target, output.map)
                 .with_context(|| path.display().to_string())?;
             write_mesh(path, &mesh, &attributes)?;
+        }
+        Kind::Picture => {
+            let picture = pair_picture(output.source, output.target, output.map, PICTURE_WIDTH)
+                .with_context(|| path.display().to_string())?;
+            write_atomically(path, |out| out.write_all(&picture.to_png()))?;
         }
         Kind::Viewer => {
             let page = viewer_html(&ViewerPair {

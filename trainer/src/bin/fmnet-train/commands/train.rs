@@ -16,19 +16,8 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
         None => TrainConfig::default(),
     };
     args.overrides.apply(&mut config);
-    let device = match args.cuda {
-        true => Device::new_cuda(0)
-            .context("no CUDA device; build with `--features cuda`, or leave --cuda out")?,
-        false => Device::Cpu,
-    };
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    // The first interrupt ends the run after the current minibatch, with a checkpoint; a second one at once.
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })?;
+    let device = device(args.cuda)?;
+    let stop = stop_flag()?;
     let progress = Progress::new(common);
     let summary = train(&config, &device, &|event| progress.event(event), &stop)?;
     let out = config.out.display();
@@ -46,4 +35,26 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// The first GPU, or the CPU.
+pub(super) fn device(cuda: bool) -> Result<Device> {
+    match cuda {
+        true => {
+            Device::new_cuda(0).context("no CUDA device; build with `--features cuda`, or leave --cuda out")
+        }
+        false => Ok(Device::Cpu),
+    }
+}
+
+/// Set by the first interrupt, which ends the run after the current minibatch, with a checkpoint; a second one ends it at once.
+pub(super) fn stop_flag() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })?;
+    Ok(stop)
 }
