@@ -16,7 +16,8 @@ const WIDTH: usize = 900;
 /// Every second mesh of a folder matched to the next one, in the order of their names.
 pub(super) fn section(folder: &Path, model: &Path, observer: Observer) -> Result<Section, ReproduceError> {
     let options = MatchOptions { model: ModelSource::File(model.into()), ..MatchOptions::default() };
-    let matcher = Matcher::new(&options).map_err(|e| ReproduceError::Evaluate(Box::new(e).into()))?;
+    let failed = |e: fmnet::Error| ReproduceError::Evaluate(Box::new(e).into());
+    let matcher = Matcher::new(&options).map_err(failed)?;
     let files = mesh_files(folder)?;
     let mut blocks = Vec::new();
     for pair in files.chunks_exact(2) {
@@ -24,7 +25,6 @@ pub(super) fn section(folder: &Path, model: &Path, observer: Observer) -> Result
         let (source, target) = (read_mesh(&pair[0])?.mesh, read_mesh(&pair[1])?.mesh);
         let [name_source, name_target] =
             [0, 1].map(|i| pair[i].file_stem().unwrap_or_default().to_string_lossy().into_owned());
-        let failed = |e| ReproduceError::Evaluate(Box::new(e).into());
         let described_source = matcher.describe(&name_source, &source, observer).map_err(failed)?;
         let described_target = matcher.describe(&name_target, &target, observer).map_err(failed)?;
         let found = matcher.match_shapes(&described_source, &described_target, observer).map_err(failed)?;

@@ -19,7 +19,7 @@ pub(crate) fn run(args: &ReproduceArgs, common: &Common) -> Result<()> {
     let progress = Progress::new(common);
     let observers =
         Observers { training: &|event| progress.event(event), rest: &|event| progress.stage(event) };
-    let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, &stop_flag()?)?;
+    let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, &*stop_flag()?)?;
     progress.say(&format!("report: {}", report.display()));
     if common.json {
         println!("{:#}", json!({ "experiment": experiment.name, "report": report }));
