@@ -134,7 +134,7 @@ pub enum ReproduceError {
         /// The training.
         name: &'static str,
         /// Why.
-        source: TrainError,
+        source: Box<TrainError>,
     },
     /// A training was interrupted.
     #[error("stopped in the training {0}; the same command goes on from there")]
@@ -186,7 +186,7 @@ pub fn run(
     }
     for training in &experiment.trainings {
         let summary = train(&training.config, device, observers.training, stop)
-            .map_err(|source| ReproduceError::Train { name: training.name, source })?;
+            .map_err(|source| ReproduceError::Train { name: training.name, source: Box::new(source) })?;
         if summary.stopped {
             return Err(ReproduceError::Stopped(training.name));
         }
