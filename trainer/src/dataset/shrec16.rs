@@ -61,7 +61,7 @@ pub(super) fn points(ground_truth: &Path, whole: &Path) -> Result<Vec<u32>, Data
         if weights.len() != 3 {
             return Err(wrong("expected a triangle and three barycentric weights"));
         }
-        if *face < 1.0 || *face as usize > whole.n_faces() {
+        if !(*face >= 1.0 && *face <= whole.n_faces() as f64) {
             return Err(wrong(&format!("triangle {face}, but the whole shape has {}", whole.n_faces())));
         }
         let corners = whole.faces()[*face as usize - 1];
