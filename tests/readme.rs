@@ -51,7 +51,7 @@ fn words(command: &str) -> Words {
 /// What a page's command is made to do here, in addition, so that it takes seconds.
 fn shortened(program: &str, command: &str) -> &'static [&'static str] {
     match (program, command) {
-        ("fmnet-train", "synth") => &["--count", "2", "--min-vertices", "4000", "--max-vertices", "4000"],
+        ("fmnet-train", "synth") => &["--count", "3", "--min-vertices", "4000", "--max-vertices", "4000"],
         ("fmnet-train", "train") => &[
             "--steps",
             "2",
@@ -62,11 +62,11 @@ fn shortened(program: &str, command: &str) -> &'static [&'static str] {
             "--points",
             "60",
             "--pool",
-            "120",
+            "600",
             "--validation-pairs",
             "1",
             "--decimate",
-            "600",
+            "1500",
         ],
         _ => &[],
     }

@@ -39,7 +39,8 @@ fn size(bytes: u64) -> String {
 /// basis, the factor.
 pub fn eigenbasis_bytes(n: usize, k: usize) -> u64 {
     let (n, k) = (n as u64, k as u64);
-    let vectors = 8 * n * (23 * k / 10 + 128 + k + 32);
+    let subspace = 23 * k / 10 + 128;
+    let vectors = 8 * (n * (subspace + k + 32) + 4 * subspace * subspace);
     // The fill of a planar graph's factor grows like n log n (Lipton, Rose and Tarjan 1979).
     let factor = 48 * n * u64::from(n.max(2).ilog2());
     with_margin(vectors + factor)

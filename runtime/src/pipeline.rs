@@ -217,7 +217,8 @@ impl Matcher {
 
     /// Small meshes do not have so many eigenfunctions as refinement would like.
     fn options_for(&self, mesh: &Mesh) -> ShapeOptions {
-        let available = (mesh.n_vertices() / 4).max(self.k);
+        let n = self.shape_options.decimate.map_or(mesh.n_vertices(), |most| mesh.n_vertices().min(most));
+        let available = (n / 4).max(self.k);
         ShapeOptions { k: self.shape_options.k.min(available), ..self.shape_options.clone() }
     }
 

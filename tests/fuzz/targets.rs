@@ -159,10 +159,11 @@ fn variants(extension: &str) -> Vec<Vec<u8>> {
             "nodes": [{"children": [1], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1]}, {"mesh": 0, "skin": 0, "matrix":
             [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}], "skins": [{"joints": [0, 1]}],
             "buffers": [{"byteLength": 12, "uri": "data:;base64,AAAAAAAAAAAAAAAA"}],
-            "bufferViews": [{"buffer": 0, "byteLength": 12, "byteOffset": 0, "byteStride": 12}],
+            "bufferViews": [{"buffer": 0, "byteLength": 12, "byteOffset": 0, "byteStride": 12},
+            {"buffer": 0, "byteLength": 12}],
             "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 1, "sparse": {"count": 1,
             "indices": {"bufferView": 0, "componentType": 5121}, "values": {"bufferView": 0}}},
-            {"bufferView": 0, "byteOffset": 0, "componentType": 5121, "type": "SCALAR", "count": 3}],
+            {"bufferView": 1, "byteOffset": 0, "componentType": 5121, "type": "SCALAR", "count": 3}],
             "images": [{"uri": "a.png"}], "textures": [{"source": 0}],
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5, "material": 0, "indices": 1}]}]}"#,
