@@ -49,6 +49,9 @@ pub(super) const NAMES: [&str; 19] = [
     "cache",
 ];
 
+/// Takes a file's bytes; whether the reader accepted them.
+type Run = Box<dyn Fn(&[u8]) -> bool>;
+
 /// A reader with valid files.
 pub(super) struct Target {
     pub(super) seeds: Vec<Vec<u8>>,
@@ -57,7 +60,7 @@ pub(super) struct Target {
     /// Bytes that an input may take for each of its own.
     pub(super) memory_per_byte: usize,
     /// Runs the reader; whether it took the file.
-    pub(super) run: Box<dyn Fn(&[u8]) -> bool>,
+    pub(super) run: Run,
 }
 
 impl Target {

@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(closest_point([0.25, 0.25, 3.0], corners), [0.5, 0.25, 0.25]);
         assert_eq!(closest_point([-1.0, -1.0, 0.0], corners), [1.0, 0.0, 0.0]);
         assert_eq!(closest_point([0.5, -2.0, 0.0], corners), [0.5, 0.5, 0.0]);
-        assert_eq!(closest_point([1.0, 1.0, 0.0], corners), [0.0, 0.5, 0.5]);
+        assert_eq!(closest_point([0.0, 0.5, -1.0], corners), [0.5, 0.0, 0.5]);
         assert_eq!(closest_point([2.0, 0.0, 0.0], [[1.0, 0.0, 0.0]; 3]), [1.0, 0.0, 0.0]);
     }
 

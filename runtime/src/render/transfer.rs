@@ -308,4 +308,62 @@ mod tests {
         let uvs = [&[[0.0, 0.5], [1.0, 0.5]][..], &[[0.9, 0.5]][..], &[[0.95, 0.6]][..]];
         assert_eq!(closest_together(uvs)[0], [1.0, 0.5]);
     }
+
+    /// Longitude and latitude as texture coordinates, with a seam where the longitude wraps.
+    fn map_of_the_globe(mesh: &Mesh) -> Vec<[[f32; 2]; 3]> {
+        let place = |v: u32| {
+            let [x, y, z] = mesh.vertices()[v as usize];
+            [(y.atan2(x) / std::f64::consts::TAU + 0.5) as f32, (0.5 + 0.5 * z) as f32]
+        };
+        let unwrapped = |corners: [[f32; 2]; 3]| {
+            let largest = corners.iter().map(|c| c[0]).fold(0.0, f32::max);
+            corners.map(|[u, v]| [if largest - u > 0.5 { u + 1.0 } else { u }, v])
+        };
+        mesh.faces().iter().map(|face| unwrapped(face.map(place))).collect()
+    }
+
+    #[test]
+    fn a_texture_moves_to_a_finer_mesh_without_steps_or_smears() {
+        let (coarse, fine) = (icosphere(2), icosphere(4));
+        let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
+        let donors = Donors::of_source(&PointMap::new(nearest, coarse.n_vertices()));
+        let (uvs, own) = (map_of_the_globe(&coarse), map_of_the_globe(&fine));
+        let largest = uvs.iter().map(|t| extent(*t)).fold(0.0, f32::max);
+        let error = |donors: &Donors| {
+            let moved = corner_uvs(&coarse, &uvs, &fine, donors);
+            assert!(moved.iter().all(|t| extent(*t) <= 4.0 * largest), "a triangle spans the seam");
+            // Away from the poles, where the longitude means nothing, and from the seam.
+            let counts =
+                |t: &[[f32; 2]; 3]| t.iter().all(|[u, v]| (0.2..0.8).contains(v) && (0.1..0.9).contains(u));
+            let pairs: Vec<_> = moved.iter().zip(&own).filter(|(_, own)| counts(own)).collect();
+            let off = |(a, b): &(&[[f32; 2]; 3], &[[f32; 2]; 3])| {
+                (0..3).map(|i| (a[i][0] - b[i][0]).abs()).sum::<f32>()
+            };
+            pairs.iter().map(off).sum::<f32>() / (3 * pairs.len()) as f32
+        };
+        let (steps, smooth) = (error(&donors), error(&donors.clone().interpolated(&fine, &coarse)));
+        assert!(smooth < 0.6 * steps, "{smooth} interpolated, {steps} from the nearest vertex");
+    }
+
+    #[test]
+    fn skin_weights_of_several_vertices_come_together() {
+        let joint = |_| crate::io::Joint { name: String::new(), parent: None, frame: [[0.0; 4]; 4] };
+        let (coarse, fine) = (icosphere(1), icosphere(3));
+        let n = coarse.n_vertices();
+        let skin = Skin {
+            joints: (0..n).map(joint).collect(),
+            indices: (0..n as u16).map(|v| [v, (v + 1) % n as u16, (v + 2) % n as u16, 0]).collect(),
+            weights: vec![[0.5, 0.25, 0.25, 0.0]; n],
+        };
+        let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
+        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse);
+        let moved = transfer_skin(&skin, &donors);
+        assert!(
+            moved
+                .weights
+                .iter()
+                .all(|w| (w.iter().sum::<f32>() - 1.0).abs() < 1e-5 && w.is_sorted_by(|a, b| a >= b))
+        );
+        assert!(moved.weights.iter().any(|w| w[3] > 0.0));
+    }
 }
