@@ -1,64 +1,10 @@
 //! The commands as a user runs them, on generated meshes.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
-use fmnet::io::{Attributes, read_matrix, read_mesh, read_point_map, read_vector, write_mesh};
+use fmnet::Matrix;
+use fmnet::io::{read_matrix, read_mesh, read_vector};
 use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};
-use fmnet::{Matrix, Mesh};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// The binary under test, beside the test's own folder.
-fn infer() -> Command {
-    let test = std::env::current_exe().unwrap();
-    let folder = test.parent().unwrap().parent().unwrap();
-    let binary = folder.join(format!("fmnet-infer{}", std::env::consts::EXE_SUFFIX));
-    assert!(binary.is_file(), "{} is not built; run the tests of the whole workspace", binary.display());
-    Command::new(binary)
-}
-
-struct Workplace {
-    folder: tempfile::TempDir,
-}
-
-impl Workplace {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn mesh(&self, name: &str, mesh: &Mesh) -> PathBuf {
-        let path = self.path(name);
-        write_mesh(&path, mesh, &Attributes::default()).unwrap();
-        path
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        infer().current_dir(self.folder.path()).args(arguments).output().unwrap()
-    }
-
-    fn succeed(&self, arguments: &[&str]) -> String {
-        let output = self.run(arguments);
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{arguments:?}: {stderr}");
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    fn fail(&self, arguments: &[&str], code: i32) -> String {
-        let output = self.run(arguments);
-        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
-        stderr
-    }
-}
-
-const SHOT: [&str; 6] = ["--descriptor", "shot", "-k", "40", "--shot-radius", "0.2"];
-
-fn targets(path: &Path) -> Vec<u32> {
-    read_point_map(path, None).unwrap().targets
-}
+use fmnet_tests::{SHOT, Workplace, targets};
 
 #[test]
 fn a_permuted_moved_and_scaled_copy_is_matched_exactly() {
@@ -100,8 +46,7 @@ fn every_kind_of_output_is_written_and_agrees() {
     assert_eq!(pair.mesh.n_vertices(), 2 * map.len());
     assert!(pair.attributes.vertex_colors.is_some());
     assert_eq!(read_matrix::<f64>(&work.path("c.npy")).unwrap().rows(), 40);
-    let left_over = std::fs::read_dir(work.folder.path()).unwrap();
-    assert!(left_over.into_iter().all(|e| !e.unwrap().file_name().to_string_lossy().ends_with(".tmp")));
+    assert!(work.temporary_files().is_empty());
 }
 
 #[test]

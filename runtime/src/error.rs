@@ -3,6 +3,7 @@
 use crate::descriptor::ShotError;
 use crate::fmap::FmapError;
 use crate::io::IoError;
+use crate::memory::MemoryError;
 use crate::mesh::{DecimateError, MeshError, RepairError};
 use crate::network::NetworkError;
 use crate::point_map::RecoverError;
@@ -47,9 +48,9 @@ pub enum Error {
     /// The map cannot be upscaled.
     #[error(transparent)]
     Upscale(#[from] UpscaleError),
-    /// Options that do not go together.
-    #[error("{0}")]
-    Options(String),
+    /// A stage would take more memory than there is.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// Any of these, on a known shape.
     #[error("{shape}: {source}")]
     InShape {
@@ -66,12 +67,14 @@ impl Error {
         Self::InShape { shape: shape.to_string(), source: Box::new(self) }
     }
 
-    /// Whether the program or the machine failed (a file that cannot be written, a solver that did not converge), rather than
-    /// the input or the options being wrong.
+    /// Whether the program or the machine failed (a file that cannot be written, too little memory, a solver that did
+    /// not converge), rather than the input or the options being wrong.
     pub fn is_own_failure(&self) -> bool {
         match self {
             Self::InShape { source, .. } => source.is_own_failure(),
-            Self::Io(IoError::Write { .. }) | Self::Eigen(EigenError::NotConverged { .. }) => true,
+            Self::Io(IoError::Write { .. })
+            | Self::Eigen(EigenError::NotConverged { .. })
+            | Self::Memory(_) => true,
             _ => false,
         }
     }

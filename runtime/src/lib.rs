@@ -1,4 +1,73 @@
 //! Learned dense correspondence between deformable 3D shapes: two mesh files in, a dense map out.
+//!
+//! The method is that of Litany, Remez, Rodolà, Bronstein and Bronstein, *Deep Functional Maps: Structured Prediction for Dense
+//! Shape Correspondence* (ICCV 2017): descriptors from a network, a functional map between Laplacian eigenbases from the
+//! descriptors, a point map from the functional map. This crate holds everything that is needed to use a trained network; training
+//! is `fmnet-trainer`. The equations stand in `docs/algorithms.md` of the repository, the file formats in `docs/formats.md`.
+//!
+//! # A pair from end to end
+//!
+//! A shape and a renumbered copy, matched by SHOT descriptors without a network; [`pipeline::MatchOptions::default()`] would use
+//! the model that is built in.
+//!
+//! ```
+//! use fmnet::mesh::shapes::{bumpy_sphere, permuted};
+//! use fmnet::pipeline::{DescriptorKind, MatchOptions, match_meshes};
+//!
+//! let source = bumpy_sphere(3, 1);
+//! let (target, _) = permuted(&source, 7);
+//! let options = MatchOptions {
+//!     descriptor: DescriptorKind::Shot,
+//!     k: Some(40),
+//!     shot_radius: Some(0.2),
+//!     ..MatchOptions::default()
+//! };
+//! let result = match_meshes(&source, &target, &options)?;
+//!
+//! assert_eq!(result.map.len(), source.n_vertices());
+//! let exact = (0..result.map.len())
+//!     .filter(|&v| result.map.get(v).is_some_and(|t| source.vertices()[v] == target.vertices()[t as usize]));
+//! assert_eq!(exact.count(), source.n_vertices());
+//! # Ok::<(), fmnet::Error>(())
+//! ```
+//!
+//! For files, read the meshes with [`io::read_mesh`] and write the map with [`io::write_point_map`]. For many pairs, make one
+//! [`pipeline::Matcher`], which loads the model once, call [`describe`](pipeline::Matcher::describe) once for each shape and
+//! [`match_shapes`](pipeline::Matcher::match_shapes) for each pair.
+//!
+//! # The stages
+//!
+//! | stage | module | what it gives |
+//! |---|---|---|
+//! | files | [`io`] | meshes with their attributes, point maps, matrices |
+//! | repair, decimation | [`mesh`] | an oriented manifold of bounded size, with the way back to the input's vertices |
+//! | eigenbasis | [`spectral`] | the first `k` eigenfunctions of the Laplace-Beltrami operator, `[n, k]` |
+//! | SHOT | [`descriptor`] | local shape around each vertex, `[n, 352]` |
+//! | network | [`network`] | learned descriptors, `[n, 352]`, by tract or onnxruntime |
+//! | functional map | [`fmap`] | the matrix `C`, `[k_target, k_source]` |
+//! | point map | [`point_map`] | for each source vertex a target vertex |
+//! | refinement | [`refine`] | ZoomOut, spectral ICP |
+//! | upscaling | [`upscale`] | from decimated to full meshes |
+//! | evaluation | [`eval`], [`geodesic`] | geodesic errors and curves; exact distances |
+//! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |
+//!
+//! [`pipeline`] knows their order, [`shape`] what is computed of one shape; [`cache`] keeps it in a folder, [`memory`] refuses what
+//! would not fit, [`events`] tell how far it is. [`synth`] makes bodies with exact correspondences.
+//!
+//! # Conventions
+//!
+//! - X is the **source**, Y the **target**; a point map gives each source vertex a target vertex, a functional map takes functions
+//!   on the source to functions on the target.
+//! - Matrices are row-major [`Matrix`]; shapes stand in brackets, `[rows, columns]`. Geometry and linear algebra are in f64,
+//!   descriptors in f32. Vertices count from 0.
+//! - Lengths in options are relative to sqrt(area): results change neither with the unit nor with the position of a mesh.
+//! - The same input gives the same bytes, whatever the number of threads. Nothing here prints or panics on input; errors name the
+//!   element and the remedy.
+//!
+//! # Features
+//!
+//! `tract` (default) runs networks in pure Rust; `ort` runs them by onnxruntime, whose library is loaded from the path in
+//! `ORT_DYLIB_PATH`. Without either, SHOT descriptors still match.
 
 pub mod cache;
 pub mod descriptor;
@@ -9,6 +78,7 @@ pub mod fmap;
 pub mod geodesic;
 pub mod io;
 mod matrix;
+pub mod memory;
 pub mod mesh;
 pub mod network;
 pub mod pipeline;

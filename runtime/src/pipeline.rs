@@ -14,6 +14,7 @@ use crate::descriptor::ShotOptions;
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
 use crate::fmap::{FmapInfo, FmapSolver, functional_map};
+use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
 use crate::point_map::{PointMap, recover};
 use crate::refine::{IcpOptions, ZoomOutOptions, icp, zoomout};
@@ -216,7 +217,8 @@ impl Matcher {
 
     /// Small meshes do not have so many eigenfunctions as refinement would like.
     fn options_for(&self, mesh: &Mesh) -> ShapeOptions {
-        let available = (mesh.n_vertices() / 4).max(self.k);
+        let n = self.shape_options.decimate.map_or(mesh.n_vertices(), |most| mesh.n_vertices().min(most));
+        let available = (n / 4).max(self.k);
         ShapeOptions { k: self.shape_options.k.min(available), ..self.shape_options.clone() }
     }
 
@@ -241,9 +243,16 @@ impl Matcher {
                 functional_map_info.rank, self.k
             )));
         }
+        let needed = memory::search_bytes(
+            source.shape.n(),
+            target.shape.n(),
+            basis_target.k().max(self.shape_options.k),
+        );
+        let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
         let raw =
             timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
         let map = self.refine(&source.shape, &target.shape, &functional_map, raw, &pair, observer)?;
+        drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
         Ok(Match { map, functional_map, functional_map_info, upscale_info })
@@ -318,6 +327,9 @@ impl Matcher {
         if let Some(basis) = self.cache.as_ref().and_then(|cache| cached_basis(cache, key, observer)) {
             return Ok(basis.at_unit_area(basis.k()));
         }
+        let needed = memory::eigenbasis_bytes(shape.full_mesh.n_vertices(), UPSCALE_K);
+        let _reserved = memory::reserve("the eigenbasis of the full mesh", needed, memory::FULL)
+            .map_err(|e| Error::from(e).in_shape(&shape.name))?;
         let (basis, _) = timed(observer, &shape.name, "full eigenbasis", || {
             eigenbasis(&Laplacian::new(&shape.full_mesh), UPSCALE_K, &EigenOptions::default())
         })

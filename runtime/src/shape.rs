@@ -7,6 +7,7 @@ use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::descriptor::{ShotOptions, shot};
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
+use crate::memory;
 use crate::mesh::{DecimateOptions, RepairOptions, decimate, repair};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::{Matrix, Mesh};
@@ -76,12 +77,17 @@ impl Shape {
             _ => None,
         };
         let work = decimated.as_ref().map_or(&full_mesh, |(mesh, _)| mesh);
+        let (n, k) = (work.n_vertices(), options.k);
+        let needed = memory::eigenbasis_bytes(n, k).max(memory::descriptor_bytes(n, k));
+        let reserved =
+            memory::reserve("the eigenbasis", needed, memory::DECIMATE).map_err(|e| in_shape(e.into()))?;
         let (basis, _) = timed(observer, name, "eigenbasis", || {
             eigenbasis(&Laplacian::new(work), options.k, &EigenOptions::default())
         })
         .map_err(|e| in_shape(e.into()))?;
         let (shot, info) =
             timed(observer, name, "shot", || shot(work, &options.shot)).map_err(|e| in_shape(e.into()))?;
+        drop(reserved);
         if info.zero_rows > work.n_vertices() / 10 {
             observer(Event::Warning(format!(
                 "{name}: {} of {} vertices have too few neighbours for a descriptor; a larger SHOT radius may help",

@@ -1,10 +1,14 @@
-//! What several tests need: the Python and JavaScript environments, the real data, small models.
+//! What several tests need: the Python and JavaScript environments, the real data, small models, a place to run the programs in.
+
+mod workplace;
 
 use fmnet::network::contract::{FORMAT_VERSION, ModelMetadata};
 use fmnet::{Matrix, descriptor, fmap};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+
+pub use workplace::{SHOT, Workplace, files_below, infer, scratch, targets, train};
 
 /// The workspace.
 pub fn root() -> PathBuf {

@@ -8,6 +8,9 @@ use super::window::{Hit, Window, open_windows};
 
 /// Relative slack within which two lengths of the same path agree.
 const ROUNDING: f64 = 1e-9;
+/// Windows that one search may open, for each neighbour sought. Clean surfaces stay far below; where faces lie on each other or
+/// share edges by the dozen their number would double at every crossing. Beyond it the lines found so far have to do.
+const WINDOWS_PER_NEIGHBOR: usize = 200;
 
 /// Finds the straight geodesics out of one vertex after another, with working memory that is reused.
 pub(super) struct LocalSearch<'a> {
@@ -63,7 +66,7 @@ impl<'a> LocalSearch<'a> {
     pub(super) fn straight_geodesics(&mut self, source: u32, n_neighbors: usize) -> Vec<Hit> {
         let radius = self.bound_by_edges(source, n_neighbors);
         let mut hits = Vec::new();
-        self.unfold(source, radius, &mut hits);
+        self.unfold(source, radius, WINDOWS_PER_NEIGHBOR * n_neighbors, &mut hits);
         hits.retain(|hit| hit.distance <= self.bounds[hit.vertex as usize] * (1.0 + ROUNDING));
         hits.sort_by(|x, y| x.vertex.cmp(&y.vertex).then(x.distance.total_cmp(&y.distance)));
         hits.dedup_by_key(|hit| hit.vertex);
@@ -111,14 +114,14 @@ impl<'a> LocalSearch<'a> {
     }
 
     /// Unfolds faces breadth first, which tightens the bounds before they are needed further out.
-    fn unfold(&mut self, source: u32, radius: f64, hits: &mut Vec<Hit>) {
+    fn unfold(&mut self, source: u32, radius: f64, max_windows: usize, hits: &mut Vec<Hit>) {
         let surface = self.surface;
         let mut windows = std::mem::take(&mut self.windows);
         windows.clear();
         let whole = |_, angle| Some([0.0, angle]);
         open_windows(surface, source, whole, |hit| hits.push(hit), |window| windows.push(window));
         let mut next = 0;
-        while next < windows.len() {
+        while next < windows.len().min(max_windows) {
             let window = windows[next];
             next += 1;
             let span = window.span();

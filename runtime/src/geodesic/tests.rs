@@ -190,3 +190,15 @@ fn distances_scale_with_the_mesh() {
         }
     }
 }
+
+/// Every face twice: each crossing could go on in three ways, and the number of windows would grow without bound.
+#[test]
+fn faces_on_top_of_each_other_end_in_time() {
+    let mesh = crate::mesh::shapes::bumpy_sphere(3, 1);
+    let doubled = Mesh::new(mesh.vertices().to_vec(), [mesh.faces(), mesh.faces()].concat()).unwrap();
+    let options = GeodesicOptions::default();
+    let single = GeodesicSolver::new(&mesh, &options).from_source(5);
+    let found = GeodesicSolver::new(&doubled, &options).from_source(5);
+    let worst = single.iter().zip(&found).map(|(a, b)| (a - b).abs() / a.max(0.1)).fold(0.0, f32::max);
+    assert!(worst < 0.05, "distances differ by {worst}");
+}

@@ -89,8 +89,8 @@ fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
 /// | `.glb` | rounded to f32 | yes | per corner, embedded | yes | yes |
 ///
 /// Vertex `i` of the mesh is vertex `i` of the file. GLB has texture coordinates per vertex only, so a vertex on a
-/// seam is repeated there, behind the `n` vertices of the mesh. An embedded texture is written beside a `.ply`
-/// or `.obj` as `STEM_texture.png` (or `.jpg`).
+/// seam is repeated there, behind the `n` vertices of the mesh. A texture that is embedded or in another folder is written beside
+/// a `.ply` or `.obj` as `STEM_texture.png` (or whatever its extension).
 pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
     attributes.check(mesh).map_err(|(problem, remedy)| IoError::Unwritable {
         path: path.into(),

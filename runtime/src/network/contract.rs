@@ -23,6 +23,11 @@ pub const OUTPUT: &str = "descriptors";
 /// The newest format that this version reads.
 pub const FORMAT_VERSION: u32 = 1;
 
+/// Most eigenfunctions of a functional map.
+const MAX_K: usize = 500;
+/// Least number of vertices that meshes are decimated to.
+const MIN_DECIMATE: usize = 100;
+
 const PREFIX: &str = "fmnet.";
 const ONNX_FLOAT: i32 = 1;
 
@@ -96,7 +101,7 @@ impl ModelMetadata {
             "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
             other => return Err(pairs.contract(format!("unknown {PREFIX}solver {other:?}"))),
         };
-        Ok(Self {
+        let metadata = Self {
             format_version,
             shot: ShotOptions {
                 radius: pairs.value("shot_radius")?,
@@ -112,7 +117,34 @@ impl ModelMetadata {
             steps: pairs.value("steps")?,
             commit: pairs.text("commit")?.to_string(),
             license: pairs.text("license")?.to_string(),
-        })
+        };
+        metadata.check().map_err(|reason| pairs.contract(reason))?;
+        Ok(metadata)
+    }
+
+    /// Whether every setting is in the range that the pipeline takes.
+    fn check(&self) -> Result<(), String> {
+        let wrong = |key: &str, value: &dyn std::fmt::Display, range: &str| {
+            Err(format!("{PREFIX}{key} is {value}, but must be {range}; export the model anew"))
+        };
+        if !(1..=MAX_K).contains(&self.k) {
+            return wrong("k", &self.k, "1 to 500");
+        }
+        if !(self.shot.radius > 0.0 && self.shot.radius < 1.0) {
+            return wrong("shot_radius", &self.shot.radius, "between 0 and 1");
+        }
+        if self.shot.bins.checked_add(1).and_then(|bins| bins.checked_mul(32)) != Some(WIDTH) {
+            return wrong("shot_bins", &self.shot.bins, "10");
+        }
+        if let FmapSolver::Regularized { weight } = self.solver
+            && !(weight.is_finite() && weight >= 0.0)
+        {
+            return wrong("mask_weight", &weight, "0 or more");
+        }
+        if self.decimate.is_some_and(|n| n < MIN_DECIMATE) {
+            return wrong("decimate", &self.decimate.unwrap_or(0), "0 (never), or 100 or more");
+        }
+        Ok(())
     }
 }
 

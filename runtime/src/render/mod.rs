@@ -1,5 +1,6 @@
 //! Pictures and attributes: colours of a map, the coloured pair, its picture, transfer, the HTML viewer.
 
+mod blend;
 mod colormap;
 mod pair;
 mod picture;

@@ -1,8 +1,10 @@
 //! Attributes carried over a map.
 //!
 //! A map gives each source vertex a target vertex, so the source can take whatever the target has, vertex by vertex. The other
-//! way round each target vertex takes from the source vertex whose match is nearest on the target.
+//! way round each target vertex takes from the source vertex whose match is nearest on the target. Where neighbours share a match,
+//! [`Donors::interpolated`] finds places within the giver's triangles.
 
+use super::blend::{Blend, blends};
 use crate::io::{Attributes, Skin};
 use crate::mesh::{Topology, vec3};
 use crate::point_map::PointMap;
@@ -10,14 +12,25 @@ use crate::{Matrix, Mesh};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// For each receiving vertex the giving vertex, if it has one.
+/// For each receiving vertex the giving vertex, if it has one, and where it was interpolated the place near it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Donors(Vec<Option<u32>>);
+pub struct Donors {
+    nearest: Vec<Option<u32>>,
+    /// The giver's corners and their weights, where they are not one vertex.
+    places: Vec<Option<Place>>,
+}
+
+/// A place in a triangle of the giver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Place {
+    blend: Blend,
+    corners: [u32; 3],
+}
 
 impl Donors {
     /// The source receives: each vertex from its match.
     pub fn of_source(map: &PointMap) -> Self {
-        Self(map.iter().collect())
+        Self::new(map.iter().collect())
     }
 
     /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several that match
@@ -47,27 +60,50 @@ impl Donors {
                 }
             }
         }
-        Self(donor)
+        Self::new(donor)
+    }
+
+    fn new(nearest: Vec<Option<u32>>) -> Self {
+        Self { places: vec![None; nearest.len()], nearest }
+    }
+
+    /// The same with places within the giver's triangles where neighbouring vertices share a donor: the receiver is finer than
+    /// the giver, or the map is blurred, and values would come out in steps. Vertices with a donor of their own keep it.
+    pub fn interpolated(self, receiver: &Mesh, giver: &Mesh) -> Self {
+        let place = |blend: Blend| Place { blend, corners: giver.faces()[blend.face as usize] };
+        let places = blends(&self, receiver, giver).into_iter().map(|blend| blend.map(place)).collect();
+        Self { places, ..self }
     }
 
     /// Number of receiving vertices.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.nearest.len()
     }
 
     /// Whether there are no receiving vertices.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.nearest.is_empty()
     }
 
     /// The giving vertex of each receiving vertex in turn.
     pub fn iter(&self) -> impl Iterator<Item = Option<u32>> + '_ {
-        self.0.iter().copied()
+        self.nearest.iter().copied()
     }
 
-    fn gather<T: Copy>(&self, values: &[T], missing: T) -> Vec<T> {
-        self.iter().map(|d| d.map_or(missing, |d| values[d as usize])).collect()
+    /// Vertices and weights that each receiving vertex takes from; `None` without a match.
+    fn shares(&self) -> impl Iterator<Item = Option<[(usize, f64); 3]>> + '_ {
+        self.nearest.iter().zip(&self.places).map(|(nearest, place)| match place {
+            Some(Place { blend, corners }) => {
+                Some([0, 1, 2].map(|i| (corners[i] as usize, blend.weights[i])))
+            }
+            None => nearest.map(|d| [(d as usize, 1.0), (d as usize, 0.0), (d as usize, 0.0)]),
+        })
     }
+}
+
+/// `sum w value`, where vertices without weight do not count, whatever their value.
+fn weighted(shares: [(usize, f64); 3], value: impl Fn(usize) -> f64) -> f64 {
+    shares.into_iter().filter(|&(_, w)| w > 0.0).map(|(v, w)| w * value(v)).sum()
 }
 
 /// A distance, never NaN, as a key of the queue.
@@ -90,8 +126,10 @@ impl Ord for Ordered {
 
 /// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match.
 pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
-    let rows = donors.iter().map(|d| d.map(|d| d as usize)).collect::<Vec<_>>();
-    Matrix::from_fn(rows.len(), values.cols(), |i, j| rows[i].map_or(f64::NAN, |d| values[(d, j)]))
+    let shares: Vec<_> = donors.shares().collect();
+    Matrix::from_fn(shares.len(), values.cols(), |i, j| {
+        shares[i].map_or(f64::NAN, |shares| weighted(shares, |v| values[(v, j)]))
+    })
 }
 
 /// For each landmark of the giver the receiving vertex that takes from nearest to it, if any does.
@@ -122,21 +160,52 @@ pub fn transfer_attributes(
     receiver: &Mesh,
     donors: &Donors,
 ) -> Attributes {
-    let skin = attributes.skin.as_ref().map(|skin| Skin {
-        joints: skin.joints.clone(),
-        indices: donors.gather(&skin.indices, [0; 4]),
-        weights: donors.gather(&skin.weights, [0.0; 4]),
-    });
+    let color = |colors: &[[u8; 4]], shares: Option<[(usize, f64); 3]>| {
+        let mixed = |shares| [0, 1, 2, 3].map(|c| weighted(shares, |v| colors[v][c].into()).round() as u8);
+        shares.map_or(super::UNMATCHED_COLOR, mixed)
+    };
+    let scalar = |values: &[f32], shares: Option<[(usize, f64); 3]>| {
+        shares.map_or(f32::NAN, |shares| weighted(shares, |v| values[v].into()) as f32)
+    };
     let scalars = attributes.vertex_scalars.iter();
     Attributes {
-        vertex_colors: attributes.vertex_colors.as_ref().map(|c| donors.gather(c, super::UNMATCHED_COLOR)),
+        vertex_colors: attributes
+            .vertex_colors
+            .as_ref()
+            .map(|c| donors.shares().map(|s| color(c, s)).collect()),
         corner_uvs: attributes.corner_uvs.as_ref().map(|uvs| corner_uvs(giver, uvs, receiver, donors)),
         texture: attributes.texture.clone(),
         vertex_scalars: scalars
-            .map(|(name, values)| (name.clone(), donors.gather(values, f32::NAN)))
+            .map(|(name, values)| (name.clone(), donors.shares().map(|s| scalar(values, s)).collect()))
             .collect(),
-        skin,
+        skin: attributes.skin.as_ref().map(|skin| transfer_skin(skin, donors)),
     }
+}
+
+/// The four largest of the weights that come together at each vertex, with the same sum.
+fn transfer_skin(skin: &Skin, donors: &Donors) -> Skin {
+    let of_vertex = |shares: Option<[(usize, f64); 3]>| {
+        let mut joints: Vec<(u16, f64)> = Vec::new();
+        for (v, share) in shares.into_iter().flatten() {
+            for (&joint, &weight) in skin.indices[v].iter().zip(&skin.weights[v]) {
+                let weight = share * f64::from(weight);
+                match joints.iter_mut().find(|(known, _)| *known == joint) {
+                    Some((_, sum)) => *sum += weight,
+                    None if weight > 0.0 => joints.push((joint, weight)),
+                    None => {}
+                }
+            }
+        }
+        joints.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let sum = |joints: &[(u16, f64)]| joints.iter().map(|j| j.1).sum::<f64>();
+        let all = sum(&joints);
+        joints.truncate(4);
+        let factor = if joints.is_empty() { 0.0 } else { all / sum(&joints) };
+        joints.resize(4, (0, 0.0));
+        ([0, 1, 2, 3].map(|i| joints[i].0), [0, 1, 2, 3].map(|i| (joints[i].1 * factor) as f32))
+    };
+    let (indices, weights) = donors.shares().map(of_vertex).unzip();
+    Skin { joints: skin.joints.clone(), indices, weights }
 }
 
 fn corner_uvs(giver: &Mesh, uvs: &[[[f32; 2]; 3]], receiver: &Mesh, donors: &Donors) -> Vec<[[f32; 2]; 3]> {
@@ -148,20 +217,47 @@ fn corner_uvs(giver: &Mesh, uvs: &[[[f32; 2]; 3]], receiver: &Mesh, donors: &Don
             }
         }
     }
-    let choices = |v: u32| donors.0[v as usize].map_or(&[][..], |d| &of_vertex[d as usize]);
-    receiver.faces().iter().map(|face| closest_together(face.map(choices))).collect()
+    // A place within a triangle has one texture coordinate, a vertex one for each side of a seam.
+    let within = |v: u32| {
+        donors.places[v as usize].map(|Place { blend, .. }| {
+            let corners = uvs[blend.face as usize];
+            [0, 1].map(|c| (0..3).map(|i| blend.weights[i] * f64::from(corners[i][c])).sum::<f64>() as f32)
+        })
+    };
+    let triangle = |face: &[u32; 3]| {
+        let places = face.map(within);
+        let at_vertices = |v: u32| donors.nearest[v as usize].map_or(&[][..], |d| &of_vertex[d as usize]);
+        let choices =
+            [0, 1, 2].map(|i| places[i].as_ref().map_or(at_vertices(face[i]), std::slice::from_ref));
+        let chosen = closest_together(choices);
+        // Larger than the giver's triangles there: it would span a seam.
+        let of_giver =
+            face.iter().filter_map(|&v| Some(extent(uvs[donors.places[v as usize]?.blend.face as usize])));
+        let largest = of_giver.fold(0.0, f32::max);
+        if largest > 0.0 && extent(chosen) > 4.0 * largest {
+            closest_together(face.map(at_vertices))
+        } else {
+            chosen
+        }
+    };
+    receiver.faces().iter().map(triangle).collect()
+}
+
+/// Sum of the squared sides of a triangle in the texture.
+fn extent([a, b, c]: [[f32; 2]; 3]) -> f32 {
+    let distance = |p: [f32; 2], q: [f32; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
+    distance(a, b) + distance(b, c) + distance(c, a)
 }
 
 /// Of each corner's choices the ones that make the smallest triangle in the texture.
 fn closest_together(choices: [&[[f32; 2]]; 3]) -> [[f32; 2]; 3] {
     const NOWHERE: &[[f32; 2]] = &[[0.0, 0.0]];
     let [a, b, c] = choices.map(|options| if options.is_empty() { NOWHERE } else { options });
-    let distance = |p: [f32; 2], q: [f32; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
     let mut best = ([a[0], b[0], c[0]], f32::INFINITY);
     for &p in a {
         for &q in b {
             for &r in c {
-                let size = distance(p, q) + distance(q, r) + distance(r, p);
+                let size = extent([p, q, r]);
                 if size < best.1 {
                     best = ([p, q, r], size);
                 }
@@ -211,5 +307,63 @@ mod tests {
     fn no_triangle_spans_a_seam() {
         let uvs = [&[[0.0, 0.5], [1.0, 0.5]][..], &[[0.9, 0.5]][..], &[[0.95, 0.6]][..]];
         assert_eq!(closest_together(uvs)[0], [1.0, 0.5]);
+    }
+
+    /// Longitude and latitude as texture coordinates, with a seam where the longitude wraps.
+    fn map_of_the_globe(mesh: &Mesh) -> Vec<[[f32; 2]; 3]> {
+        let place = |v: u32| {
+            let [x, y, z] = mesh.vertices()[v as usize];
+            [(y.atan2(x) / std::f64::consts::TAU + 0.5) as f32, (0.5 + 0.5 * z) as f32]
+        };
+        let unwrapped = |corners: [[f32; 2]; 3]| {
+            let largest = corners.iter().map(|c| c[0]).fold(0.0, f32::max);
+            corners.map(|[u, v]| [if largest - u > 0.5 { u + 1.0 } else { u }, v])
+        };
+        mesh.faces().iter().map(|face| unwrapped(face.map(place))).collect()
+    }
+
+    #[test]
+    fn a_texture_moves_to_a_finer_mesh_without_steps_or_smears() {
+        let (coarse, fine) = (icosphere(2), icosphere(4));
+        let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
+        let donors = Donors::of_source(&PointMap::new(nearest, coarse.n_vertices()));
+        let (uvs, own) = (map_of_the_globe(&coarse), map_of_the_globe(&fine));
+        let largest = uvs.iter().map(|t| extent(*t)).fold(0.0, f32::max);
+        let error = |donors: &Donors| {
+            let moved = corner_uvs(&coarse, &uvs, &fine, donors);
+            assert!(moved.iter().all(|t| extent(*t) <= 4.0 * largest), "a triangle spans the seam");
+            // Away from the poles, where the longitude means nothing, and from the seam.
+            let counts =
+                |t: &[[f32; 2]; 3]| t.iter().all(|[u, v]| (0.2..0.8).contains(v) && (0.1..0.9).contains(u));
+            let pairs: Vec<_> = moved.iter().zip(&own).filter(|(_, own)| counts(own)).collect();
+            let off = |(a, b): &(&[[f32; 2]; 3], &[[f32; 2]; 3])| {
+                (0..3).map(|i| (a[i][0] - b[i][0]).abs()).sum::<f32>()
+            };
+            pairs.iter().map(off).sum::<f32>() / (3 * pairs.len()) as f32
+        };
+        let (steps, smooth) = (error(&donors), error(&donors.clone().interpolated(&fine, &coarse)));
+        assert!(smooth < 0.6 * steps, "{smooth} interpolated, {steps} from the nearest vertex");
+    }
+
+    #[test]
+    fn skin_weights_of_several_vertices_come_together() {
+        let joint = |_| crate::io::Joint { name: String::new(), parent: None, frame: [[0.0; 4]; 4] };
+        let (coarse, fine) = (icosphere(1), icosphere(3));
+        let n = coarse.n_vertices();
+        let skin = Skin {
+            joints: (0..n).map(joint).collect(),
+            indices: (0..n as u16).map(|v| [v, (v + 1) % n as u16, (v + 2) % n as u16, 0]).collect(),
+            weights: vec![[0.5, 0.25, 0.25, 0.0]; n],
+        };
+        let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
+        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse);
+        let moved = transfer_skin(&skin, &donors);
+        assert!(
+            moved
+                .weights
+                .iter()
+                .all(|w| (w.iter().sum::<f32>() - 1.0).abs() < 1e-5 && w.is_sorted_by(|a, b| a >= b))
+        );
+        assert!(moved.weights.iter().any(|w| w[3] > 0.0));
     }
 }

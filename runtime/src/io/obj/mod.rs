@@ -1,7 +1,7 @@
 //! Wavefront OBJ: vertices in file order, with colours behind the coordinates; polygons with texture coordinates.
 //!
-//! The geometry is parsed here: `tobj` renumbers the vertices of each object by first use and drops those that no
-//! face uses, but vertex `i` of the file must stay vertex `i`. The material library is read with `tobj`.
+//! Parsed here: `tobj` renumbers the vertices of each object by first use and drops those that no face uses, but vertex `i` of
+//! the file must stay vertex `i`; and it panics on some material libraries.
 
 mod material;
 mod write;

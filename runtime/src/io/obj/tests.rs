@@ -95,3 +95,23 @@ fn errors_say_line_and_range() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+#[test]
+fn a_texture_from_elsewhere_is_copied() {
+    let (from, to) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (image, path) = (from.path().join("skin.jpeg"), to.path().join("b.obj"));
+    std::fs::write(&image, [1, 2, 3]).unwrap();
+    let mesh = read_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh;
+    let attributes = crate::io::Attributes {
+        corner_uvs: Some(vec![[[0.0, 0.25], [1.0, 0.0], [0.0, 0.5]]]),
+        texture: Some(Texture::File(image)),
+        ..Default::default()
+    };
+    write(&path, &mesh, &attributes).unwrap();
+    let file = crate::io::read_mesh(&path).unwrap();
+    assert_eq!(file.attributes.texture, Some(Texture::File(to.path().join("b_texture.jpeg"))));
+    assert_eq!(std::fs::read(to.path().join("b_texture.jpeg")).unwrap(), [1, 2, 3]);
+    let absent = Texture::File(from.path().join("absent.png"));
+    write(&path, &mesh, &crate::io::Attributes { texture: Some(absent.clone()), ..attributes }).unwrap();
+    assert_eq!(crate::io::read_mesh(&path).unwrap().attributes.texture, Some(absent));
+}

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::Mesh;
 use crate::io::attributes::{Attributes, Texture};
@@ -122,15 +122,18 @@ fn write_faces(w: &mut dyn Write, mesh: &Mesh, attributes: &Attributes) -> io::R
 }
 
 impl Texture {
-    /// How a mesh file at `path` refers to the image: a name relative to its folder where that is possible. An
-    /// embedded image is written beside the mesh.
+    /// How a mesh file at `path` refers to the image: a name relative to its folder. An image that is elsewhere or embedded
+    /// is written beside the mesh; one that does not exist is referred to by its absolute path.
     pub(in crate::io) fn place_beside(&self, path: &Path) -> Result<String, IoError> {
         match self {
             Self::File(image) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
-                let relative = image.strip_prefix(folder).ok().filter(|p| p.is_relative());
-                let absolute = || std::path::absolute(image).unwrap_or_else(|_| image.clone());
-                let name = relative.map_or_else(absolute, Path::to_path_buf);
+                let inside = image.strip_prefix(folder).ok().filter(|p| p.is_relative());
+                let name = match inside {
+                    Some(inside) => inside.to_path_buf(),
+                    None => copied(image, path)?
+                        .unwrap_or_else(|| std::path::absolute(image).unwrap_or_else(|_| image.clone())),
+                };
                 Ok(name.to_string_lossy().replace(char::is_control, "_"))
             }
             Self::Embedded { bytes, mime } => {
@@ -142,4 +145,19 @@ impl Texture {
             }
         }
     }
+}
+
+/// Copies an image beside the mesh as `STEM_texture.EXTENSION`; its name, or `None` where the image cannot be read.
+fn copied(image: &Path, mesh: &Path) -> Result<Option<PathBuf>, IoError> {
+    let readable = std::fs::metadata(image).is_ok_and(|m| m.is_file());
+    let Some(bytes) = readable.then(|| std::fs::read(image).ok()).flatten() else { return Ok(None) };
+    let mut name = mesh.file_stem().unwrap_or_default().to_os_string();
+    name.push("_texture");
+    let mut name = PathBuf::from(name);
+    if let Some(extension) = image.extension() {
+        name.as_mut_os_string().push(".");
+        name.as_mut_os_string().push(extension);
+    }
+    write_atomically(&mesh.with_file_name(&name), |w| w.write_all(&bytes))?;
+    Ok(Some(name))
 }

@@ -65,16 +65,16 @@ pub(crate) struct SynthArgs {
     /// Seed: the same seed gives the same dataset
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u32,
-    /// Least number of vertices of a body, 1000 to 20000
+    /// Least number of vertices of a body, 4000 up to the largest
     #[arg(long, default_value_t = 5000)]
     pub(crate) min_vertices: usize,
-    /// Largest number of vertices of a body, 1000 to 20000
+    /// Largest number of vertices of a body, up to 15000
     #[arg(long, default_value_t = 7000)]
     pub(crate) max_vertices: usize,
-    /// Holes in each body, 0 and up
+    /// Holes in each body, 0 to 20
     #[arg(long, default_value_t = 0)]
     pub(crate) holes: usize,
-    /// Limbs cut off each body, 0 and up
+    /// Limbs cut off each body, 0 to 3
     #[arg(long, default_value_t = 0)]
     pub(crate) cuts: usize,
     /// Noise on the vertices, relative to the mean edge length, 0 to 0.5

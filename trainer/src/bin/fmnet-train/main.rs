@@ -3,10 +3,17 @@
 #[allow(rustdoc::broken_intra_doc_links, reason = "the comments are help texts, where [n] is a shape")]
 mod args;
 mod commands;
+mod interrupt;
 mod progress;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
+use fmnet::io::IoError;
+use fmnet::synth::SynthError;
+use fmnet_trainer::checkpoint::CheckpointError;
+use fmnet_trainer::export::ExportError;
+use fmnet_trainer::precompute::PrepareError;
+use fmnet_trainer::train::TrainError;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -20,6 +27,7 @@ fn main() -> ExitCode {
     {
         eprintln!("warning: --threads {threads}: {e}");
     }
+    interrupt::watch(matches!(cli.command, Command::Train(_) | Command::Reproduce(_)));
     let outcome = match cli.command {
         Command::Synth(args) => commands::synth::run(&args, &cli.common),
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
@@ -33,7 +41,23 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if is_own_failure(&error) { 1 } else { 2 })
         }
     }
+}
+
+/// Whether the program or the machine failed (a file that cannot be written, a step that went wrong), rather than the input or
+/// the options being wrong.
+fn is_own_failure(error: &anyhow::Error) -> bool {
+    let unwritable = |io: &IoError| matches!(io, IoError::Write { .. });
+    let of_training = |error: &TrainError| match error {
+        TrainError::Io(io) | TrainError::Checkpoint(CheckpointError::Io(io)) => unwritable(io),
+        TrainError::Prepare(PrepareError::Shape(error)) => error.is_own_failure(),
+        TrainError::Step { .. } => true,
+        _ => false,
+    };
+    error.downcast_ref().is_some_and(of_training)
+        || error.downcast_ref().is_some_and(unwritable)
+        || matches!(error.downcast_ref(), Some(ExportError::Io(io)) if unwritable(io))
+        || matches!(error.downcast_ref(), Some(SynthError::Write(io)) if unwritable(io))
 }

@@ -1,7 +1,7 @@
 //! `fmnet-infer batch`: many pairs, each shape processed once.
 
 use super::matching::read;
-use super::output::file_name;
+use super::output::{create_folder, file_name};
 use crate::args::BatchArgs;
 use crate::console::Console;
 use anyhow::{Context, Result, bail};
@@ -23,7 +23,7 @@ struct Pair {
 
 pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     let pairs = read_pairs(args)?;
-    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
+    create_folder(&args.out)?;
     let options = args.pipeline.to_options();
     let cache = options.cache.clone().unwrap_or_else(|| args.out.join("cache"));
     let matcher = Matcher::new(&MatchOptions { cache: Some(cache), ..options })?;

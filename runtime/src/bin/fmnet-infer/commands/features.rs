@@ -1,10 +1,10 @@
 //! `fmnet-infer features`: what other programs need to go on from: eigenbasis, areas and descriptors.
 
 use super::matching::read;
-use super::output::file_name;
+use super::output::{create_folder, file_name};
 use crate::args::FeaturesArgs;
 use crate::console::Console;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use fmnet::io::{write_matrix, write_vector};
 use fmnet::pipeline::Matcher;
 use serde_json::json;
@@ -13,7 +13,7 @@ pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
     let matcher = Matcher::new(&args.pipeline.to_options())?;
     let mesh = read(&args.mesh, console)?;
     let described = matcher.describe(&file_name(&args.mesh), &mesh, &|event| console.event(event))?;
-    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
+    create_folder(&args.out)?;
     let shape = &described.shape;
     let basis = shape.basis.truncated(matcher.k());
     write_vector(&args.out.join("eigenvalues.npy"), &basis.eigenvalues)?;

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use fmnet::Mesh;
-use fmnet::io::{PointMapFormat, write_atomically, write_mesh, write_point_map};
+use fmnet::io::{IoError, PointMapFormat, write_atomically, write_mesh, write_point_map};
 use fmnet::point_map::PointMap;
 use fmnet::render::{ViewerPair, pair_picture, side_by_side, viewer_html};
 use std::path::Path;
@@ -54,6 +54,11 @@ pub(crate) fn check(outputs: &[std::path::PathBuf]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Creates a folder for outputs, and those it is in.
+pub(crate) fn create_folder(path: &Path) -> Result<(), IoError> {
+    std::fs::create_dir_all(path).map_err(|source| IoError::Write { path: path.into(), source })
 }
 
 /// Writes one output.

@@ -27,6 +27,7 @@ pub(crate) fn run(args: &TransferArgs, console: &Console) -> Result<()> {
         Receiver::Source => (&target, &source, Donors::of_source(&map)),
         Receiver::Target => (&source, &target, Donors::of_target(&map, &target.mesh)),
     };
+    let donors = donors.interpolated(&receiver.mesh, &giver.mesh);
     let mut values = args.values.iter();
     for output in &args.outputs {
         if is_mesh(output) {

@@ -1,7 +1,8 @@
 //! `fmnet-train reproduce`.
 
-use super::train::{device, stop_flag};
+use super::train::device;
 use crate::args::{Common, ReproduceArgs};
+use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use fmnet_trainer::reproduce::{Observers, Settings, experiment, run as run_experiment};
@@ -19,7 +20,7 @@ pub(crate) fn run(args: &ReproduceArgs, common: &Common) -> Result<()> {
     let progress = Progress::new(common);
     let observers =
         Observers { training: &|event| progress.event(event), rest: &|event| progress.stage(event) };
-    let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, &*stop_flag()?)?;
+    let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, interrupt::stop())?;
     progress.say(&format!("report: {}", report.display()));
     if common.json {
         println!("{:#}", json!({ "experiment": experiment.name, "report": report }));

@@ -1,14 +1,13 @@
 //! `fmnet-train train`.
 
 use crate::args::{Common, TrainArgs};
+use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
 use candle_core::Device;
 use fmnet_trainer::config::TrainConfig;
 use fmnet_trainer::train::train;
 use serde_json::json;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
     let mut config = match &args.config {
@@ -17,9 +16,8 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
     };
     args.overrides.apply(&mut config);
     let device = device(args.cuda)?;
-    let stop = stop_flag()?;
     let progress = Progress::new(common);
-    let summary = train(&config, &device, &|event| progress.event(event), &stop)?;
+    let summary = train(&config, &device, &|event| progress.event(event), interrupt::stop())?;
     let out = config.out.display();
     if summary.stopped {
         progress
@@ -45,16 +43,4 @@ pub(super) fn device(cuda: bool) -> Result<Device> {
         }
         false => Ok(Device::Cpu),
     }
-}
-
-/// Set by the first interrupt, which ends the run after the current minibatch, with a checkpoint; a second one ends it at once.
-pub(super) fn stop_flag() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })?;
-    Ok(stop)
 }

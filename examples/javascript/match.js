@@ -1,0 +1,140 @@
+// Matches two meshes with a model of fmnet, in plain JavaScript and onnxruntime-node.
+//
+//     fmnet-infer features a.ply --out a --model model.onnx
+//     fmnet-infer features b.ply --out b --model model.onnx
+//     npm install && node match.js a b model.onnx map.txt
+//
+// Line i of map.txt is the vertex of b.ply that matches vertex i of a.ply, the map of `fmnet-infer match --refine none`. Where
+// the mesh was repaired or decimated, `features` also writes vertices.npy, and a line belongs to the vertex that is named there.
+"use strict";
+const fs = require("fs");
+const path = require("path");
+const ort = require("onnxruntime-node");
+
+/** A .npy file as { data, rows, cols }; a vector has one column. */
+function readNpy(file) {
+  const bytes = fs.readFileSync(file);
+  const start = 10 + bytes.readUInt16LE(8);
+  const header = bytes.toString("latin1", 10, start);
+  const kinds = { "<f8": Float64Array, "<f4": Float32Array, "<i4": Int32Array };
+  const Kind = kinds[/'descr': '(...)'/.exec(header)[1]];
+  const [rows, cols = 1] = /'shape': \(([^)]*)\)/.exec(header)[1].split(",").filter(s => s.trim()).map(Number);
+  return { data: new Kind(bytes.buffer.slice(bytes.byteOffset + start, bytes.byteOffset + bytes.length)), rows, cols };
+}
+
+/** The model's metadata_props, field 14 of ONNX's protocol buffer: what the network expects of its input and of the map. */
+function readMetadata(file) {
+  const metadata = {};
+  forEachField(fs.readFileSync(file), (field, bytes) => {
+    if (field !== 14) return;
+    const entry = [];
+    forEachField(bytes, (part, text) => { entry[part] = text.toString(); });
+    metadata[entry[1]] = entry[2];
+  });
+  return metadata;
+}
+
+function forEachField(bytes, visit) {
+  let at = 0;
+  const varint = () => {
+    for (let value = 0, scale = 1; ; scale *= 128) {
+      value += (bytes[at] & 127) * scale;
+      if (bytes[at++] < 128) return value;
+    }
+  };
+  while (at < bytes.length) {
+    const key = varint(), kind = key % 8;
+    const length = kind === 2 ? varint() : { 1: 8, 5: 4 }[kind];
+    if (length === undefined) { varint(); continue; }
+    visit(Math.floor(key / 8), bytes.subarray(at, at += length));
+  }
+}
+
+/** The eigenbasis [n, k] of a shape scaled to unit area, and the Fourier coefficients [k, 352] of its learned descriptors. */
+async function readShape(folder, session) {
+  const read = name => readNpy(path.join(folder, name + ".npy"));
+  const mass = read("mass").data, area = mass.reduce((a, b) => a + b);
+  const shot = read("shot"), { data: phi, rows: n, cols: k } = read("eigenvectors");
+  const input = new ort.Tensor("float32", shot.data, [n, shot.cols]);
+  const { descriptors } = await session.run({ shot: input });
+  const coefficients = Array.from({ length: k }, () => new Float64Array(shot.cols));
+  for (let i = 0; i < n; i++) {
+    for (let j = 0; j < k; j++) {
+      phi[i * k + j] *= Math.sqrt(area);
+      const weight = phi[i * k + j] * mass[i] / area;
+      for (let q = 0; q < shot.cols; q++) coefficients[j][q] += weight * descriptors.data[i * shot.cols + q];
+    }
+  }
+  const renumbered = fs.existsSync(path.join(folder, "vertices.npy")) ? read("vertices").data : null;
+  return { n, k, phi, coefficients, eigenvalues: read("eigenvalues").data.map(x => x * area), renumbered };
+}
+
+const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+
+/** How little each entry [k_target, k_source] of a map that commutes with the Laplacians is used (Ren et al. 2019). */
+function resolventMask(source, target) {
+  const largest = Math.max(...source.eigenvalues, ...target.eigenvalues);
+  const resolvent = eigenvalue => {
+    const g = Math.sqrt(Math.max(eigenvalue, 0) / largest);
+    return [g / (g * g + 1), 1 / (g * g + 1)];
+  };
+  const columns = Array.from(source.eigenvalues, resolvent);
+  return Array.from(target.eigenvalues, resolvent)
+    .map(([re, im]) => columns.map(([re2, im2]) => (re - re2) ** 2 + (im - im2) ** 2));
+}
+
+/** Solves S x = b for a symmetric positive definite S by its Cholesky factor. */
+function solve(S, b) {
+  const k = b.length, L = S.map(row => Float64Array.from(row)), x = Float64Array.from(b);
+  for (let i = 0; i < k; i++) {
+    for (let j = 0; j <= i; j++) {
+      let sum = L[i][j];
+      for (let m = 0; m < j; m++) sum -= L[i][m] * L[j][m];
+      L[i][j] = i === j ? Math.sqrt(sum) : sum / L[j][j];
+    }
+    for (let m = 0; m < i; m++) x[i] -= L[i][m] * x[m];
+    x[i] /= L[i][i];
+  }
+  for (let i = k - 1; i >= 0; i--) {
+    for (let m = i + 1; m < k; m++) x[i] -= L[m][i] * x[m];
+    x[i] /= L[i][i];
+  }
+  return x;
+}
+
+/** Rows of C [k_target, k_source] with C F = G: each row has a system of its own, (F F^T + weight diag(mask_i)) c_i = F g_i. */
+function functionalMap(source, target, metadata) {
+  const F = source.coefficients, mask = resolventMask(source, target);
+  const gram = F.map(a => F.map(b => dot(a, b)));
+  const strength = metadata["fmnet.solver"] === "regularized" ? Number(metadata["fmnet.mask_weight"]) : 0;
+  const weight = strength * gram.reduce((sum, row, i) => sum + row[i], 0) / source.k;
+  return target.coefficients.map((g, i) => {
+    const system = gram.map((row, a) => row.map((x, b) => a === b ? x + weight * mask[i][a] : x));
+    return solve(system, F.map(f => dot(f, g)));
+  });
+}
+
+/** For each row of the source the row of the target whose eigenfunctions are nearest to C phi. */
+function pointMap(C, source, target) {
+  const k = target.k, psi = target.phi;
+  return Array.from({ length: source.n }, (_, x) => {
+    const phi = source.phi.subarray(x * source.k, (x + 1) * source.k), transported = C.map(row => dot(row, phi));
+    let best = 0, smallest = Infinity;
+    for (let y = 0; y < target.n; y++) {
+      let distance = 0;
+      for (let j = 0; j < k && distance < smallest; j++) distance += (transported[j] - psi[y * k + j]) ** 2;
+      if (distance < smallest) [best, smallest] = [y, distance];
+    }
+    return best;
+  });
+}
+
+async function main() {
+  const [folderSource, folderTarget, model, out] = process.argv.slice(2);
+  const session = await ort.InferenceSession.create(model);
+  const source = await readShape(folderSource, session), target = await readShape(folderTarget, session);
+  const matches = pointMap(functionalMap(source, target, readMetadata(model)), source, target);
+  fs.writeFileSync(out, matches.map(y => (target.renumbered ? target.renumbered[y] : y) + "\n").join(""));
+}
+
+main().catch(error => { console.error(error); process.exit(1); });

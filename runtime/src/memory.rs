@@ -1,0 +1,210 @@
+//! Memory that a stage will take, compared with what there is before it starts.
+//!
+//! A stage that would not fit is refused with its estimate, instead of the machine swapping or the system ending the process.
+//! Estimates are of the stage's peak, from the sizes of what it allocates; the test of this module and `docs/robustness.md` compare
+//! them with what was measured. On Linux the memory available is the least of what the machine, the control group and the
+//! limit of the address space leave; elsewhere it is not known and nothing is refused.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use thiserror::Error;
+
+/// A stage would take more memory than there is.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{stage} would take about {}, but {} are available; {remedy}", size(*.needed), size(*.available))]
+pub struct MemoryError {
+    /// The stage.
+    pub stage: &'static str,
+    /// Its estimate, in bytes.
+    pub needed: u64,
+    /// What there is, in bytes, less what is set aside for stages that run at the same time.
+    pub available: u64,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
+/// The remedy where a mesh is too large as it is.
+pub(crate) const DECIMATE: &str =
+    "decimate the mesh (--decimate N), ask for fewer eigenfunctions (-k N) or free some memory";
+
+/// The remedy where the full mesh is too large to upscale a map to.
+pub(crate) const FULL: &str =
+    "decimate the mesh with another program before matching it, or free some memory";
+
+fn size(bytes: u64) -> String {
+    let mebibytes = bytes as f64 / f64::from(1 << 20);
+    if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.1} GiB", mebibytes / 1024.0) }
+}
+
+/// Bytes of the eigenbasis of `k` pairs of a mesh of `n` vertices: the subspace of about 2.3 k + 128 vectors and its panels, the
+/// basis, the factor.
+pub fn eigenbasis_bytes(n: usize, k: usize) -> u64 {
+    let (n, k) = (n as u64, k as u64);
+    let subspace = 23 * k / 10 + 128;
+    let vectors = 8 * (n * (subspace + k + 32) + 4 * subspace * subspace);
+    // The fill of a planar graph's factor grows like n log n (Lipton, Rose and Tarjan 1979).
+    let factor = 48 * n * u64::from(n.max(2).ilog2());
+    with_margin(vectors + factor)
+}
+
+/// Bytes of a described shape: its basis of `k` pairs, SHOT, `[n, 352]` f32, and the network's activations of that size.
+pub fn descriptor_bytes(n: usize, k: usize) -> u64 {
+    let n = n as u64;
+    with_margin(8 * n * k as u64 + 4 * 4 * 352 * n)
+}
+
+/// Allocators and small arrays take their share.
+fn with_margin(bytes: u64) -> u64 {
+    bytes + bytes / 8
+}
+
+/// Bytes of a search among `n_target` rows of width `k` by `n_source` rows: the transported rows, the sorted copy.
+pub fn search_bytes(n_source: usize, n_target: usize, k: usize) -> u64 {
+    8 * k as u64 * (2 * n_source as u64 + 2 * n_target as u64)
+}
+
+/// Memory set aside for a stage, until dropped.
+#[derive(Debug)]
+pub struct Reservation(u64);
+
+#[derive(Default)]
+struct Ledger {
+    /// What there was when nothing was set aside: stages under way take their share of it little by little.
+    available: Option<u64>,
+    reserved: u64,
+}
+
+static LEDGER: Mutex<Ledger> = Mutex::new(Ledger { available: None, reserved: 0 });
+
+fn ledger() -> MutexGuard<'static, Ledger> {
+    LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Sets memory aside for a stage; hold the result while it runs.
+///
+/// # Errors
+/// Where more is needed than available.
+pub fn reserve(stage: &'static str, needed: u64, remedy: &'static str) -> Result<Reservation, MemoryError> {
+    let mut ledger = ledger();
+    if ledger.reserved == 0 {
+        ledger.available = available();
+    }
+    let available = ledger.available.map(|all| all.saturating_sub(ledger.reserved));
+    if let Some(available) = available.filter(|&available| needed > available) {
+        return Err(MemoryError { stage, needed, available, remedy });
+    }
+    ledger.reserved += needed;
+    Ok(Reservation(needed))
+}
+
+impl Drop for Reservation {
+    fn drop(&mut self) {
+        ledger().reserved -= self.0;
+    }
+}
+
+/// Bytes that this process may still take; `None` where that is not known.
+#[cfg(target_os = "linux")]
+pub fn available() -> Option<u64> {
+    [linux::machine(), linux::control_group(), linux::address_space()].into_iter().flatten().min()
+}
+
+/// Bytes that this process may still take; `None` where that is not known.
+#[cfg(not(target_os = "linux"))]
+pub fn available() -> Option<u64> {
+    None
+}
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::fs::read_to_string;
+    use std::path::Path;
+
+    /// What the kernel reckons can be had without swapping.
+    pub(super) fn machine() -> Option<u64> {
+        kibibytes(&read_to_string("/proc/meminfo").ok()?, "MemAvailable:")
+    }
+
+    /// What the limit of the address space leaves (`ulimit -v`).
+    pub(super) fn address_space() -> Option<u64> {
+        let limit = address_limit(&read_to_string("/proc/self/limits").ok()?)?;
+        let used = kibibytes(&read_to_string("/proc/self/status").ok()?, "VmSize:")?;
+        Some(limit.saturating_sub(used))
+    }
+
+    /// What the control groups leave, version 2 or 1.
+    pub(super) fn control_group() -> Option<u64> {
+        let groups = read_to_string("/proc/self/cgroup").ok()?;
+        let own = groups.lines().find_map(|line| line.strip_prefix("0::/"));
+        let root = Path::new("/sys/fs/cgroup");
+        let unified = own.map(|own| root.join(own)).into_iter();
+        let second = unified.flat_map(|own| {
+            let groups: Vec<_> =
+                own.ancestors().take_while(|g| g.starts_with(root)).map(Path::to_path_buf).collect();
+            groups
+                .into_iter()
+                .filter_map(|group| left(&group, "memory.max", "memory.current", "inactive_file "))
+        });
+        let first = root.join("memory");
+        let first = left(&first, "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file ");
+        second.chain(first).min()
+    }
+
+    /// The limit of a group less what is used of it, where the page cache does not count.
+    fn left(group: &Path, limit: &str, usage: &str, cache: &str) -> Option<u64> {
+        let number = |file: &str| read_to_string(group.join(file)).ok()?.trim().parse::<u64>().ok();
+        let (limit, usage) = (number(limit)?, number(usage)?);
+        let statistics = read_to_string(group.join("memory.stat")).unwrap_or_default();
+        let cached = statistics.lines().find_map(|line| line.strip_prefix(cache)?.trim().parse().ok());
+        Some(limit.saturating_sub(usage.saturating_sub(cached.unwrap_or(0))))
+    }
+
+    /// The value in bytes of a line such as `VmSize:   1234 kB`.
+    pub(super) fn kibibytes(text: &str, key: &str) -> Option<u64> {
+        let value = text.lines().find_map(|line| line.strip_prefix(key))?;
+        value.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
+    }
+
+    /// The soft limit in `/proc/self/limits`; `None` where it is unlimited.
+    pub(super) fn address_limit(text: &str) -> Option<u64> {
+        let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+        line.split_whitespace().next()?.parse().ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_set_aside_is_not_given_twice() {
+        let Some(all) = available() else { return };
+        let refused = reserve("a test", u64::MAX / 2, "ask for less").unwrap_err();
+        assert!(refused.to_string().starts_with("a test would take about"), "{refused}");
+        let half = reserve("a test", all / 2, "ask for less");
+        if let Ok(half) = half {
+            let second = reserve("a test", all / 4 * 3, "ask for less").unwrap_err();
+            assert!(second.available <= all - all / 4, "{second}");
+            drop(half);
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_kernels_tables_are_understood() {
+        assert_eq!(
+            linux::kibibytes("MemTotal: 5 kB\nMemAvailable:    7 kB\n", "MemAvailable:"),
+            Some(7 << 10)
+        );
+        let limits = "Max data size             unlimited            unlimited            bytes\n\
+                      Max address space         2048                 unlimited            bytes\n";
+        assert_eq!(linux::address_limit(limits), Some(2048));
+        assert_eq!(linux::address_limit("Max address space  unlimited unlimited bytes\n"), None);
+        assert!(linux::machine().is_some_and(|bytes| bytes > 1 << 20));
+    }
+
+    #[test]
+    fn sizes_read_well() {
+        assert_eq!(size(300 << 20), "300 MiB");
+        assert_eq!(size(5 << 30), "5.0 GiB");
+    }
+}

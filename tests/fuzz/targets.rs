@@ -1,0 +1,330 @@
+//! What is fuzzed: readers with valid files to start from.
+
+use crate::mutate::mutated;
+use candle_core::Device;
+use fmnet::cache::{Cache, Lookup};
+use fmnet::descriptor::ShotOptions;
+use fmnet::events::ignore;
+use fmnet::io::{
+    Attributes, Joint, Skin, Texture, decode_mesh, read_matrix, read_point_map, read_vector, write_matrix,
+    write_mesh, write_point_map,
+};
+use fmnet::mesh::inspect;
+use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
+use fmnet::network::{Backend, DescriptorNetwork};
+use fmnet::point_map::PointMap;
+use fmnet::shape::{Shape, ShapeOptions};
+use fmnet::{Matrix, Mesh};
+use fmnet_tests::test_metadata;
+use fmnet_trainer::checkpoint::Checkpoint;
+use fmnet_trainer::config::TrainConfig;
+use fmnet_trainer::dataset::{Correspondence, Dataset, ShapeEntry, Split};
+use fmnet_trainer::export::to_onnx;
+use fmnet_trainer::network::{Network, NetworkOptions};
+use fmnet_trainer::optimizer::AdamState;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::{Path, PathBuf};
+
+/// Every target.
+pub(super) const NAMES: [&str; 19] = [
+    "off",
+    "ply",
+    "obj",
+    "mtl",
+    "gltf",
+    "glb",
+    "stl",
+    "shape",
+    "map.txt",
+    "map.vts",
+    "map.npy",
+    "map.csv",
+    "matrix.npy",
+    "model",
+    "dataset.toml",
+    "baryc_gt",
+    "config.toml",
+    "checkpoint",
+    "cache",
+];
+
+/// Takes a file's bytes; whether the reader accepted them.
+type Run = Box<dyn Fn(&[u8]) -> bool>;
+
+/// A reader with valid files.
+pub(super) struct Target {
+    pub(super) seeds: Vec<Vec<u8>>,
+    /// Bytes that any input may take.
+    pub(super) memory: usize,
+    /// Bytes that an input may take for each of its own.
+    pub(super) memory_per_byte: usize,
+    /// Runs the reader; whether it took the file.
+    pub(super) run: Run,
+}
+
+impl Target {
+    fn new(seeds: Vec<Vec<u8>>, run: impl Fn(&[u8]) -> bool + 'static) -> Self {
+        Self { seeds, memory: 8 << 20, memory_per_byte: 400, run: Box::new(run) }
+    }
+
+    fn with_memory(self, memory: usize) -> Self {
+        Self { memory, ..self }
+    }
+
+    /// The seeds themselves, then changed ones without end.
+    pub(super) fn input(&self, seed: u64, index: u64) -> Vec<u8> {
+        if let Some(unchanged) = self.seeds.get(index as usize) {
+            return unchanged.clone();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ index);
+        mutated(&self.seeds[index as usize % self.seeds.len()], &self.seeds, &mut rng)
+    }
+}
+
+/// A target by its name; `folder` is for its files.
+pub(super) fn make(name: &str, folder: &Path) -> Target {
+    std::fs::create_dir_all(folder).unwrap();
+    match name {
+        "off" | "ply" | "obj" | "gltf" | "glb" | "stl" => meshes(name, folder),
+        "mtl" => materials(folder),
+        "shape" => shapes(folder),
+        "map.txt" | "map.vts" | "map.npy" | "map.csv" => maps(name, folder),
+        "matrix.npy" => matrices(folder),
+        "model" => models(),
+        "dataset.toml" => manifests(folder),
+        "baryc_gt" => barycentric(folder),
+        "config.toml" => configs(folder),
+        "checkpoint" => checkpoints(folder),
+        "cache" => cache_entries(folder),
+        _ => panic!("there is no target {name}"),
+    }
+}
+
+/// Two triangles with every attribute.
+fn decorated() -> (Mesh, Attributes) {
+    let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.1], [1.0, 1.0, 0.5]];
+    let mesh = Mesh::new(vertices, vec![[0, 1, 2], [2, 1, 3]]).unwrap();
+    let frame = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+    let joint = |parent| Joint { name: "j".into(), parent, frame };
+    let attributes = Attributes {
+        vertex_colors: Some(vec![[1, 2, 3, 4], [255, 0, 0, 255], [0, 128, 0, 255], [0; 4]]),
+        corner_uvs: Some(vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0.5, 0.5], [1.0, 0.0], [0.5, 0.25]]]),
+        texture: Some(Texture::Embedded { bytes: vec![0x89, b'P', b'N', b'G'], mime: "image/png".into() }),
+        vertex_scalars: vec![("f".into(), vec![0.0, 1.0, 2.0, 3.0])],
+        skin: Some(Skin {
+            joints: vec![joint(None), joint(Some(0))],
+            indices: vec![[0, 1, 0, 0]; 4],
+            weights: vec![[0.5, 0.5, 0.0, 0.0]; 4],
+        }),
+    };
+    (mesh, attributes)
+}
+
+/// Files of one format as the writers here write them, and as others do.
+fn seeds_of(extension: &str, folder: &Path) -> Vec<Vec<u8>> {
+    let path = folder.join(format!("seed.{extension}"));
+    let mut seeds: Vec<Vec<u8>> = variants(extension);
+    if !matches!(extension, "gltf" | "stl") {
+        let (mesh, attributes) = decorated();
+        for (mesh, attributes) in [(mesh, attributes), (bumpy_sphere(1, 1), Attributes::default())] {
+            write_mesh(&path, &mesh, &attributes).unwrap();
+            seeds.push(std::fs::read(&path).unwrap());
+        }
+    }
+    seeds
+}
+
+fn variants(extension: &str) -> Vec<Vec<u8>> {
+    let text = |text: &str| text.as_bytes().to_vec();
+    match extension {
+        "off" => vec![text(
+            "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 0 1 0 1 1 0\n0 1 0 0 0 1 0 0 1 1 0 1\n3 0 1 2\n",
+        )],
+        "ply" => vec![text(
+            "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty float x\nproperty double y\n\
+             property short z\nproperty list uchar int l\nelement tristrips 1\nproperty list int int vertex_indices\n\
+             element face 1\nproperty list uint8 int32 vertex_index\nproperty list uchar float texcoord\nend_header\n\
+             0 0 0 0\n1 2 3 2 4 5\n7 1 0 1 2\n4 0 1 2 -1\n3 0 1 2 6 0 0 1 0 0 1\n",
+        )],
+        "obj" => vec![text(
+            "o a\nv 0 0 0\nv 1 0 0 1 0 1\nv 1 1 0\nv 0 1 0\nvt 0 1\nvn 0 0 1\nf -1/-1/1 -2/1 1//1 \\\n2\nusemtl a\nf 1 2 3 4\n",
+        )],
+        "stl" => {
+            let mut binary = vec![b' '; 80];
+            binary.extend([2, 0, 0, 0]);
+            binary.extend([0; 100]);
+            let ascii = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+            vec![binary, text(ascii)]
+        }
+        "gltf" => vec![text(
+            r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+            "nodes": [{"children": [1], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1]}, {"mesh": 0, "skin": 0, "matrix":
+            [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}], "skins": [{"joints": [0, 1]}],
+            "buffers": [{"byteLength": 12, "uri": "data:;base64,AAAAAAAAAAAAAAAA"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 12, "byteOffset": 0, "byteStride": 12},
+            {"buffer": 0, "byteLength": 12}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 1, "sparse": {"count": 1,
+            "indices": {"bufferView": 0, "componentType": 5121}, "values": {"bufferView": 0}}},
+            {"bufferView": 1, "byteOffset": 0, "componentType": 5121, "type": "SCALAR", "count": 3}],
+            "images": [{"uri": "a.png"}], "textures": [{"source": 0}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5, "material": 0, "indices": 1}]}]}"#,
+        )],
+        _ => Vec::new(),
+    }
+}
+
+fn meshes(extension: &str, folder: &Path) -> Target {
+    let seeds = seeds_of(extension, folder);
+    let (path, out) = (folder.join(format!("a.{extension}")), folder.join("out"));
+    Target::new(seeds, move |bytes| {
+        let Ok(file) = decode_mesh(bytes, &path) else { return false };
+        // What was read can be written, or is refused.
+        if bytes.len().is_multiple_of(16) {
+            for extension in ["ply", "obj", "glb", "off"] {
+                let _ = write_mesh(&out.with_extension(extension), &file.mesh, &file.attributes);
+            }
+        }
+        true
+    })
+}
+
+fn materials(folder: &Path) -> Target {
+    let (library, mesh) = (folder.join("a.mtl"), folder.join("a.obj"));
+    let seed = "# two\nnewmtl a\nKa 1 1 1\nKd 0.5 0.5 0.5\nNs 10\nd 1\nTr 0\nillum 2\nmap_Kd -s 1 1 1 skin.png\nnewmtl b\nmap_Kd b.jpg\n";
+    let text = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 2/1 3/1\n";
+    Target::new(vec![seed.into()], move |bytes| {
+        std::fs::write(&library, bytes).unwrap();
+        decode_mesh(text, &mesh).is_ok()
+    })
+}
+
+/// Whatever geometry can be read goes through inspection and every stage up to the descriptors.
+fn shapes(folder: &Path) -> Target {
+    let path = folder.join("a.off");
+    let tangled = joined(&[&grid(5, 5), &bumpy_sphere(1, 1), &bumpy_sphere(1, 1)]);
+    let seeds = [bumpy_sphere(2, 1), bumpy_sphere(1, 2), grid(9, 7), tangled].into_iter().map(|mesh| {
+        write_mesh(&path, &mesh, &Attributes::default()).unwrap();
+        std::fs::read(&path).unwrap()
+    });
+    let options =
+        ShapeOptions { k: 6, decimate: Some(60), shot: ShotOptions { radius: 0.3, ..Default::default() } };
+    let target = Target::new(seeds.collect(), move |bytes| {
+        let Ok(file) = decode_mesh(bytes, Path::new("a.off")) else { return false };
+        inspect(&file.mesh);
+        Shape::process("fuzz", &file.mesh, &options, &ignore).is_ok()
+    });
+    target.with_memory(256 << 20)
+}
+
+fn maps(name: &str, folder: &Path) -> Target {
+    let path = folder.join(name);
+    let (targets, confidence) = (vec![1, 0, PointMap::UNMATCHED], Some(vec![0.5, 1.0, 0.0]));
+    write_point_map(&path, &PointMap { targets, confidence, n_target: 2 }).unwrap();
+    Target::new(vec![std::fs::read(&path).unwrap()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        read_point_map(&path, None).is_ok() | read_point_map(&path, Some(2)).is_ok()
+    })
+}
+
+fn matrices(folder: &Path) -> Target {
+    let path = folder.join("matrix.npy");
+    write_matrix(&path, &Matrix::from_vec(2, 2, vec![0.0, 1.0, 2.0, 3.0])).unwrap();
+    let doubles = std::fs::read(&path).unwrap();
+    write_matrix(&path, &Matrix::from_vec(1, 4, vec![0.0f32; 4])).unwrap();
+    Target::new(vec![doubles, std::fs::read(&path).unwrap()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        let matrix = read_matrix::<f64>(&path).is_ok() | read_matrix::<f32>(&path).is_ok();
+        matrix | read_vector::<f64>(&path).is_ok() | read_vector::<i32>(&path).is_ok()
+    })
+}
+
+fn small_network() -> Network {
+    Network::new(NetworkOptions { blocks: 1, ..NetworkOptions::default() }, &Device::Cpu).unwrap()
+}
+
+/// Loads and, where the file is accepted, runs it.
+fn models() -> Target {
+    let network = small_network();
+    let seeds = [true, false].map(|per_shape| to_onnx(&network, &test_metadata(per_shape)).unwrap());
+    let shot = Matrix::from_fn(3, 352, |i, j| ((i * 352 + j) as f32 * 0.1).sin().abs());
+    let target = Target::new(seeds.to_vec(), move |bytes| {
+        let network = DescriptorNetwork::from_bytes(Path::new("model.onnx"), bytes, Backend::Tract);
+        network.is_ok_and(|network| network.descriptors(&shot).is_ok())
+    });
+    target.with_memory(256 << 20)
+}
+
+fn manifests(folder: &Path) -> Target {
+    let (mesh, path, folder) = (folder.join("a.off"), folder.join("dataset.toml"), folder.to_path_buf());
+    write_mesh(&mesh, &grid(2, 2), &Attributes::default()).unwrap();
+    std::fs::write(folder.join("a.vts"), "1\n0\n3\n").unwrap();
+    let seed = "format = 1\n[[shape]]\nname = \"a\"\nmesh = \"a.off\"\ngroup = \"g\"\ncorrespondence = \"a.vts\"\nsplit = \"train\"\n\
+                partial = false\n[[shape]]\nname = \"b\"\nmesh = \"a.off\"\ngroup = \"g\"\nsplit = \"test\"\n";
+    Target::new(vec![seed.into()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        let Ok(dataset) = Dataset::open(&folder) else { return false };
+        let read = |shape: &ShapeEntry| shape.read().and_then(|mesh| shape.points(&mesh)).is_ok();
+        dataset.shapes.iter().all(read)
+    })
+}
+
+fn barycentric(folder: &Path) -> Target {
+    let (whole, path) = (folder.join("whole.off"), folder.join("part.baryc_gt"));
+    write_mesh(&whole, &grid(2, 2), &Attributes::default()).unwrap();
+    let entry = ShapeEntry {
+        name: "part".into(),
+        mesh: whole.clone(),
+        group: "g".into(),
+        correspondence: Correspondence::Barycentric(path.clone(), whole),
+        split: Split::Train,
+        partial: true,
+    };
+    Target::new(vec!["1 1 0 0\n2 0.25 0.5 0.25\n8 0 0 1\n".into()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        entry.points(&grid(2, 2)).is_ok()
+    })
+}
+
+fn configs(folder: &Path) -> Target {
+    let path: PathBuf = folder.join("config.toml");
+    Target::new(vec![TrainConfig::default().to_toml().into()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        TrainConfig::read(&path).is_ok_and(|config| config.check().is_ok() || config.dataset.0.is_empty())
+    })
+}
+
+fn checkpoints(folder: &Path) -> Target {
+    let path = folder.join("last.safetensors");
+    let network = small_network();
+    let parameters = network.parameter_values().unwrap();
+    let checkpoint = Checkpoint {
+        config: TrainConfig { blocks: 1, ..TrainConfig::default() },
+        step: 3,
+        best_error: f64::INFINITY,
+        adam: AdamState { step: 3, first: vec![0.0; parameters.len()], second: vec![0.0; parameters.len()] },
+        parameters,
+        running: network.running_statistics().to_vec(),
+    };
+    checkpoint.write(&path).unwrap();
+    let target = Target::new(vec![std::fs::read(&path).unwrap()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        Checkpoint::read(&path).is_ok_and(|checkpoint| checkpoint.network(&Device::Cpu).is_ok())
+    });
+    target.with_memory(64 << 20)
+}
+
+/// Entries whose checksum is right and whose content is not.
+fn cache_entries(folder: &Path) -> Target {
+    let cache = Cache::open(folder).unwrap();
+    let (mesh, options) = (bumpy_sphere(1, 1), ShapeOptions { k: 4, ..ShapeOptions::default() });
+    Shape::process_cached("seed", &mesh, &options, Some(&cache), &ignore).unwrap();
+    let key = Shape::cache_key(&mesh, &options);
+    let Lookup::Hit(payload) = cache.get("shape", key) else { panic!("the shape was not kept") };
+    let target = Target::new(vec![payload], move |bytes| {
+        cache.put("shape", key, bytes).unwrap();
+        Shape::process_cached("fuzz", &mesh, &options, Some(&cache), &ignore).is_ok()
+    });
+    target.with_memory(64 << 20)
+}
