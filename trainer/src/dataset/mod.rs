@@ -193,3 +193,6 @@ fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,13 @@
 //! What a 3D scanner would have made of a registered shape.
 //!
-//! The registration's volume is sampled on a turned grid, parts that nearly touch grow together ([`ScanOptions::contact`]), and
+//! The registration is rounded between its vertices, its volume is sampled on a turned grid, parts that nearly touch grow together ([`ScanOptions::contact`]), and
 //! the surface is polygonised and decimated: nothing of the template's connectivity remains. What no camera sees is left open
 //! in part, further holes are made, the surface gets noise, and a few stray pieces float around it.
 
 use super::carve::{carve, disc, largest_component, patches};
 use super::polygonize::polygonize;
 use super::random::{direction, generator, normal, uniform, weighted};
+use super::smooth::refine;
 use super::visibility::{seen, vertex_normals};
 use super::volume::Volume;
 use super::{SimulateError, check};
@@ -55,7 +56,7 @@ pub struct ScanOptions {
     /// The axis that leads away from the floor; the cameras stand around it [default: y, as in FAUST]
     #[arg(long, value_enum, default_value_t = Self::default().up, hide_default_value = true)]
     pub up: Axis,
-    /// Further holes anywhere, at most, 0 to 100; each scan has a random number of them [default: 2]
+    /// Further holes anywhere, at most, 0 to 100; each scan has a random number of them [default: 1]
     #[arg(long, default_value_t = Self::default().holes, hide_default_value = true)]
     pub holes: usize,
     /// Radius of the largest of these holes, relative to sqrt(area), 0.005 to 0.3 [default: 0.04]
@@ -80,7 +81,7 @@ impl Default for ScanOptions {
             contact: 0.01,
             hidden: 0.6,
             up: Axis::Y,
-            holes: 2,
+            holes: 1,
             hole_radius: 0.04,
             noise: 6e-4,
             pieces: 3,
@@ -146,7 +147,7 @@ fn remesh(
     rng: &mut ChaCha8Rng,
 ) -> Result<Mesh, SimulateError> {
     let (axis, angle) = (direction(rng), uniform(rng, -TURN, TURN));
-    let turned = transformed(registration, rotation(axis, angle), 1.0, [0.0; 3]);
+    let turned = transformed(&refine(registration), rotation(axis, angle), 1.0, [0.0; 3]);
     // An even triangulation by equilateral triangles of side s has 2 / (sqrt(3) s^2) vertices per area.
     let edge = (2.0 / (3f64.sqrt() * options.vertices as f64)).sqrt();
     let cell = unit * (edge / CELLS_PER_EDGE).min(COARSEST);
