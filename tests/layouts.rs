@@ -79,7 +79,8 @@ fn scans_train_with_jitter_and_holes() {
     poses(folder.path(), &["tr_reg_000.ply", "tr_reg_001.ply", "tr_reg_060.ply", "tr_reg_061.ply"]);
     let out = folder.path().join("simulated");
     let dataset = Dataset::open(folder.path()).unwrap();
-    let options = ScanOptions { vertices: 1500, holes: 4, hole_radius: 0.1, ..ScanOptions::default() };
+    let options =
+        ScanOptions { vertices: 1500, detail: 0.012, holes: 4, hole_radius: 0.1, ..ScanOptions::default() };
     write_scans(&dataset, &[Split::Train, Split::Validation], &out, &options, &|_, _, _| {}).unwrap();
     let config = TrainConfig { jitter: 4, sampling: Sampling::Area, decimate: 1000, ..config(&out) };
     assert_eq!(run(&config).1.len(), 2);

@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(History::read(&path).unwrap(), History::default());
         let (mut history, mut text) = (History::default(), String::from("half a li\n"));
         let events = (1..=1500)
-            .map(|i| step(i, 1.0 / i as f64))
+            .map(|i| step(i, 0.25 + (i % 8) as f64))
             .chain([validated(1500, 3.5), TrainEvent::Checkpoint { step: 3 }]);
         for event in events {
             history.add(&event);

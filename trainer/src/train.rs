@@ -276,6 +276,7 @@ impl Run<'_> {
                 self.after_step(validation)?;
             }
             self.save(LAST)?;
+            self.plot();
             Ok(TrainSummary { step: self.step, best_error: self.best_error, stopped: self.step < last })
         })
     }

@@ -57,7 +57,7 @@ mod tests {
             1.0 - centroids.fold(f64::INFINITY, f64::min)
         };
         assert_eq!(fine.n_faces(), 4 * ball.n_faces());
-        assert!(lowest(&fine) < 0.3 * lowest(&ball));
+        assert!(lowest(&fine) < 0.4 * lowest(&ball));
         assert!(refine(&grid(4, 3)).vertices().iter().all(|p| p[2] == 0.0));
     }
 }
