@@ -47,6 +47,7 @@ pub mod loss;
 pub mod network;
 mod numeric;
 pub mod optimizer;
+pub mod plot;
 pub mod precompute;
 mod projection;
 pub mod reproduce;

@@ -9,9 +9,9 @@ use crate::dataset::{DatasetError, MISSING, ShapeEntry};
 use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
 use fmnet::events::{Observer, timed};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::mesh::nearest_vertices;
+use fmnet::mesh::{Topology, nearest_vertices};
 use fmnet::shape::{Shape, ShapeOptions};
-use fmnet::{Error, Matrix};
+use fmnet::{Error, Matrix, Mesh};
 use rand::SeedableRng;
 use rand::seq::index;
 use std::collections::BTreeMap;
@@ -33,7 +33,8 @@ pub struct PrepareOptions {
 pub struct PreparedShape {
     /// Where it comes from.
     pub entry: ShapeEntry,
-    /// Basis and descriptors.
+    /// Basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area
+    /// ([`Eigenbasis::at_unit_area`](fmnet::spectral::Eigenbasis::at_unit_area)): minibatches and maps need no other.
     pub shape: Shape,
     /// Vertex of the working mesh of every point of the group, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
@@ -44,7 +45,7 @@ pub struct PreparedShape {
 /// The points of its group's pool that a shape has, and the geodesic distances between them.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Pool {
-    /// The points, ascending, `[m]`.
+    /// The points, ascending, `[m]`; all on one component of the shape.
     pub points: Vec<u32>,
     /// Row by row, `[m, m]`; empty for a part of a shape, whose distances go around its holes.
     distances: Vec<u16>,
@@ -69,7 +70,8 @@ pub fn prepare(
     observer: Observer,
 ) -> Result<PreparedShape, PrepareError> {
     let mesh = entry.read()?;
-    let shape = Shape::process_cached(&entry.name, &mesh, &options.shape, cache, observer)?;
+    let mut shape = Shape::process_cached(&entry.name, &mesh, &options.shape, cache, observer)?;
+    shape.basis = shape.basis.at_unit_area(shape.basis.k());
     let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
     let key = CacheKey::of(&[
         Shape::cache_key(&mesh, &options.shape).as_bytes(),
@@ -92,7 +94,7 @@ pub fn prepare(
 }
 
 /// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the nearest.
-fn work_points(shape: &Shape, mesh: &fmnet::Mesh, input_points: &[u32]) -> Vec<u32> {
+fn work_points(shape: &Shape, mesh: &Mesh, input_points: &[u32]) -> Vec<u32> {
     let work_of_input = shape.work_of_input();
     let lost: Vec<u32> = input_points
         .iter()
@@ -117,14 +119,25 @@ fn group_pool(group: &str, n_points: usize, options: &PrepareOptions) -> Vec<u32
     chosen
 }
 
+/// Drops the points that do not lie on the component with the most of them: no distance leads there.
+fn keep_main_component(mesh: &Mesh, points: &[u32], chosen: &mut Vec<u32>) {
+    let components = Topology::new(mesh).components();
+    let component = |&point: &u32| components.of_vertex[points[point as usize] as usize];
+    let mut counts = BTreeMap::new();
+    chosen.iter().for_each(|point| *counts.entry(component(point)).or_insert(0usize) += 1);
+    let main = counts.into_iter().max_by_key(|&(label, count)| (count, std::cmp::Reverse(label)));
+    chosen.retain(|point| main.is_some_and(|(label, _)| component(point) == label));
+}
+
 impl Pool {
     /// Steps of the stored distances for one unit, sqrt(area).
     const STEPS: f32 = 16_384.0;
 
     fn compute(entry: &ShapeEntry, shape: &Shape, points: &[u32], options: &PrepareOptions) -> Self {
         let has = |&point: &u32| points[point as usize] != MISSING;
-        let chosen: Vec<u32> =
+        let mut chosen: Vec<u32> =
             group_pool(&entry.group, points.len(), options).into_iter().filter(has).collect();
+        keep_main_component(shape.mesh(), points, &mut chosen);
         if entry.partial {
             return Self { points: chosen, distances: Vec::new() };
         }

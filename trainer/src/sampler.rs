@@ -28,14 +28,19 @@ pub struct Sampler<'a> {
 #[derive(Debug, Error)]
 pub enum SamplerError {
     /// No two shapes correspond.
-    #[error("none of the {shapes} training shapes share a group and enough points; a group needs two shapes")]
+    #[error(
+        "none of the {shapes} training shapes share a group and {points} points; a group needs two shapes, one of them whole, \
+         and a part needs enough points of the pool: raise the pool, or lower k"
+    )]
     NoPairs {
         /// Number of training shapes.
         shapes: usize,
+        /// Points that a pair must share.
+        points: usize,
     },
 }
 
-/// Fewer common points than this do not make a pair.
+/// Fewer common points than this, or than the eigenfunctions that they must tell apart, do not make a pair.
 const MIN_COMMON_POINTS: usize = 50;
 
 impl<'a> Sampler<'a> {
@@ -45,13 +50,14 @@ impl<'a> Sampler<'a> {
         for (source, s) in shapes.iter().enumerate() {
             for (target, t) in shapes.iter().enumerate() {
                 let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.partial;
-                if corresponds && common_points(s, t).len() >= MIN_COMMON_POINTS {
+                if corresponds && common_points(s, t).len() >= MIN_COMMON_POINTS.max(config.k) {
                     pairs.push((source, target));
                 }
             }
         }
         if pairs.is_empty() {
-            return Err(SamplerError::NoPairs { shapes: shapes.len() });
+            let points = MIN_COMMON_POINTS.max(config.k);
+            return Err(SamplerError::NoPairs { shapes: shapes.len(), points });
         }
         let jitter = shapes.iter().map(|shape| jitter_neighbors(shape, config.jitter)).collect();
         Ok(Self { shapes, pairs, jitter, config })
@@ -109,15 +115,13 @@ impl<'a> Sampler<'a> {
             })
             .collect();
         let basis = &prepared.shape.basis;
-        let area: f64 = basis.mass.iter().sum();
         let k = self.config.k;
-        // Lengths in units of sqrt(area): eigenvectors have the unit 1 / length, masses its square.
-        let rows = |i: usize, j: usize| (basis.eigenvectors[(vertices[i] as usize, j)] * area.sqrt()) as f32;
+        let rows = |i: usize, j: usize| basis.eigenvectors[(vertices[i] as usize, j)] as f32;
         ShapeBatch {
             shot: prepared.shape.shot.select_rows(&vertices),
             basis: Matrix::from_fn(vertices.len(), k, rows),
-            mass: vertices.iter().map(|&v| (basis.mass[v as usize] / area) as f32).collect(),
-            eigenvalues: basis.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),
+            mass: vertices.iter().map(|&v| basis.mass[v as usize] as f32).collect(),
+            eigenvalues: basis.eigenvalues[..k].to_vec(),
             distances: prepared.pool.distances(points),
         }
     }

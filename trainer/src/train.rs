@@ -1,13 +1,14 @@
 //! The order of the stages in training: dataset -> prepared shapes -> minibatches -> steps -> validation -> checkpoints.
 //!
-//! A run's folder holds `config.toml`, `metrics.jsonl` (an event a line), `last.safetensors` and `best.safetensors`. Running
-//! the same command again goes on from `last.safetensors` with the minibatches that the uninterrupted run would have seen.
+//! A run's folder holds `config.toml`, `metrics.jsonl` (an event a line), `plot.svg` (loss and validation error so far),
+//! `last.safetensors` and `best.safetensors`. Running the same command again goes on from `last.safetensors` with the minibatches that the uninterrupted run would have seen.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
-use crate::dataset::{Dataset, DatasetError, Split};
+use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split};
 use crate::events::{TrainEvent, TrainObserver};
 use crate::network::Network;
+use crate::plot::History;
 use crate::precompute::{PrepareError, PrepareOptions, PreparedShape, prepare};
 use crate::sampler::{Sampler, SamplerError};
 use crate::step::{StepError, StepRunner};
@@ -31,6 +32,8 @@ pub const LAST: &str = "last.safetensors";
 pub const BEST: &str = "best.safetensors";
 /// Name of the list of events.
 pub const METRICS: &str = "metrics.jsonl";
+/// Name of the picture of the loss and the validation error.
+pub const PLOT: &str = "plot.svg";
 /// Minibatches prepared ahead.
 const AHEAD: usize = 2;
 
@@ -119,7 +122,7 @@ pub fn train(
     let shapes = prepare_splits(config, &config.splits.0, observer)?;
     let held_out = match config.validate_every {
         0 => Vec::new(),
-        _ => prepare_splits(config, &[Split::Validation], observer)?,
+        _ => prepare_entries(config, &validation_entries(config)?, observer)?,
     };
     let validation = Validation::new(&held_out, config.validation_pairs, config.seed);
     let sampler = Sampler::new(&shapes, config)?;
@@ -130,7 +133,8 @@ pub fn train(
             .map_err(|source| TrainError::Step { step: 0, source, checkpoint: "none".into() })?,
     };
     let metrics = open_metrics(&config.out.join(METRICS), step)?;
-    let mut run = Run { config, runner, step, best_error, metrics, observer };
+    let history = History::read(&config.out.join(METRICS))?;
+    let mut run = Run { config, runner, step, best_error, metrics, history, observer };
     run.tell(TrainEvent::Started { step, steps: config.steps, pairs: sampler.n_pairs() });
     run.go(&sampler, &validation, stop)
 }
@@ -141,15 +145,43 @@ pub fn prepare_splits(
     splits: &[Split],
     observer: TrainObserver,
 ) -> Result<Vec<PreparedShape>, TrainError> {
+    let mut entries = entries(config)?;
+    entries.retain(|entry| splits.contains(&entry.split));
+    prepare_entries(config, &entries, observer)
+}
+
+/// All shapes of all the datasets.
+fn entries(config: &TrainConfig) -> Result<Vec<ShapeEntry>, TrainError> {
     let mut entries = Vec::new();
     for (index, folder) in config.dataset.0.iter().enumerate() {
-        let dataset = Dataset::open(Path::new(folder))?;
-        for mut entry in dataset.of_splits(splits).cloned() {
+        for mut entry in Dataset::open(Path::new(folder))?.shapes {
             // Groups of different datasets do not correspond, whatever their names.
             entry.group = format!("{index}/{}", entry.group);
             entries.push(entry);
         }
     }
+    Ok(entries)
+}
+
+/// The shapes of the validation split; where a group has only parts there, its first whole shape too, which they are matched to.
+fn validation_entries(config: &TrainConfig) -> Result<Vec<ShapeEntry>, TrainError> {
+    let all = entries(config)?;
+    let mut chosen: Vec<ShapeEntry> =
+        all.iter().filter(|entry| entry.split == Split::Validation).cloned().collect();
+    for whole in all.into_iter().filter(|entry| !entry.partial && entry.split != Split::Validation) {
+        let of_group = || chosen.iter().filter(|entry| entry.group == whole.group);
+        if of_group().count() > 0 && of_group().all(|entry| entry.partial) {
+            chosen.push(whole);
+        }
+    }
+    Ok(chosen)
+}
+
+fn prepare_entries(
+    config: &TrainConfig,
+    entries: &[ShapeEntry],
+    observer: TrainObserver,
+) -> Result<Vec<PreparedShape>, TrainError> {
     let cache = Cache::open(&config.cache_folder())?;
     let options = PrepareOptions { shape: config.shape_options(), pool: config.pool, seed: config.seed };
     let done = AtomicUsize::new(0);
@@ -217,6 +249,7 @@ struct Run<'a> {
     step: u64,
     best_error: f64,
     metrics: File,
+    history: History,
     observer: TrainObserver<'a>,
 }
 
@@ -249,6 +282,7 @@ impl Run<'_> {
                 self.after_step(validation)?;
             }
             self.save(LAST)?;
+            self.plot();
             Ok(TrainSummary { step: self.step, best_error: self.best_error, stopped: self.step < last })
         })
     }
@@ -262,8 +296,17 @@ impl Run<'_> {
         if step.is_multiple_of(self.config.checkpoint_every) || last {
             self.save(LAST)?;
             self.tell(TrainEvent::Checkpoint { step });
+            self.plot();
         }
         Ok(())
+    }
+
+    /// A picture that cannot be written must not end the run.
+    fn plot(&self) {
+        let title = self.config.out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if let Err(e) = self.history.write(&self.config.out.join(PLOT), &title) {
+            (self.observer)(TrainEvent::Warning { text: e.to_string() });
+        }
     }
 
     fn validate(&mut self, validation: &Validation) -> Result<(), TrainError> {
@@ -282,6 +325,7 @@ impl Run<'_> {
             within_5: result.within_5,
             best,
         });
+        self.plot();
         Ok(())
     }
 
@@ -302,6 +346,7 @@ impl Run<'_> {
         if let Err(e) = writeln!(self.metrics, "{line}") {
             (self.observer)(TrainEvent::Warning { text: format!("{METRICS}: {e}") });
         }
+        self.history.add(&event);
         (self.observer)(event);
     }
 }

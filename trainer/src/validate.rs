@@ -33,7 +33,8 @@ pub struct ValidationResult {
 }
 
 impl<'a> Validation<'a> {
-    /// Draws at most `count` pairs of corresponding shapes.
+    /// Draws at most `count` pairs of corresponding shapes. A part is a source only, so its group needs a whole among the
+    /// shapes.
     pub fn new(shapes: &'a [PreparedShape], count: usize, seed: u64) -> Self {
         let all = (0..shapes.len()).flat_map(|s| (0..shapes.len()).map(move |t| (s, t)));
         let fits = |&(s, t): &(usize, usize)| {
@@ -89,7 +90,9 @@ impl<'a> Validation<'a> {
             common.iter().step_by(stride).filter_map(|&(a, b)| Some((b, map.get(a as usize)?))).collect();
         let solver = self.solvers[target].as_ref().expect("every target has a solver");
         let unit = t.shape.mesh().scale() as f32;
-        Ok(solver.pair_distances(&queries).iter().map(|d| d / unit).collect())
+        // A match on another component is as far away as can be.
+        let farthest = t.shape.mesh().diagonal() as f32;
+        Ok(solver.pair_distances(&queries).iter().map(|d| d.min(farthest) / unit).collect())
     }
 }
 

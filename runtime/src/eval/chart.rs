@@ -20,14 +20,35 @@ const STYLES: [(&str, &str); 8] = [
     ("#8c6d31", "9 3 2 3 2 3"),
 ];
 
-/// How the horizontal axis is divided.
+/// How an axis is divided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum XScale {
+pub enum AxisScale {
     /// Evenly.
     #[default]
     Linear,
-    /// By powers of ten; points with `x <= 0` are left out.
+    /// By powers of ten; points that are not positive are left out.
     Log10,
+}
+
+impl AxisScale {
+    /// Where a value lies along the axis.
+    fn place(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Log10 => value.log10(),
+        }
+    }
+
+    /// Round values between two places, four to eight where the axis is even.
+    fn ticks(self, [from, to]: [f64; 2]) -> Vec<f64> {
+        if self == Self::Linear {
+            return ticks([from, to]);
+        }
+        let steps: &[f64] = if to - from < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let powers = from.floor() as i32..=to.floor() as i32;
+        let all = powers.flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)));
+        all.filter(|tick| (from - 1e-9..=to + 1e-9).contains(&tick.log10())).collect()
+    }
 }
 
 /// One line of a chart.
@@ -40,7 +61,7 @@ pub struct Series {
 }
 
 /// A chart of several lines with axes, grid and legend.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineChart {
     /// Above the chart; may be empty.
     pub title: String,
@@ -49,8 +70,10 @@ pub struct LineChart {
     /// Beside the vertical axis.
     pub y_label: String,
     /// How the horizontal axis is divided.
-    pub x_scale: XScale,
-    /// Range of the vertical axis; `None` fits it to the data, from 0.
+    pub x_scale: AxisScale,
+    /// How the vertical axis is divided.
+    pub y_scale: AxisScale,
+    /// Range of the vertical axis; `None` fits it to the data, from 0 where it is divided evenly.
     pub y_range: Option<[f64; 2]>,
     /// The lines, drawn in order.
     pub series: Vec<Series>,
@@ -64,7 +87,8 @@ impl LineChart {
             title: title.into(),
             x_label: "Geodesic error / sqrt(area)".into(),
             y_label: "% of correspondences".into(),
-            x_scale: XScale::Linear,
+            x_scale: AxisScale::Linear,
+            y_scale: AxisScale::Linear,
             y_range: Some([0.0, 100.0]),
             series: series.collect(),
         }
@@ -90,26 +114,36 @@ impl LineChart {
 
 /// The plotting area and the ranges that it shows.
 struct Frame {
-    x_scale: XScale,
+    x_scale: AxisScale,
+    y_scale: AxisScale,
+    /// Ranges of the places along the axes.
     x: [f64; 2],
     y: [f64; 2],
 }
 
 impl Frame {
     fn fit(chart: &LineChart) -> Self {
-        let scale = |x: f64| if chart.x_scale == XScale::Log10 { x.log10() } else { x };
-        let points = || chart.series.iter().flat_map(|s| &s.points).map(|&(x, y)| (scale(x), y));
-        let finite = || points().filter(|(x, y)| x.is_finite() && y.is_finite());
-        let x = range(finite().map(|p| p.0));
-        let y = chart.y_range.unwrap_or_else(|| {
-            let top = finite().map(|p| p.1).fold(0.0, f64::max);
-            [0.0, if top > 0.0 { 1.05 * top } else { 1.0 }]
-        });
-        Self { x_scale: chart.x_scale, x, y }
+        let (x_scale, y_scale) = (chart.x_scale, chart.y_scale);
+        let places =
+            chart.series.iter().flat_map(|s| &s.points).map(|&(x, y)| (x_scale.place(x), y_scale.place(y)));
+        let finite: Vec<(f64, f64)> = places.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+        let x = range(finite.iter().map(|p| p.0));
+        let y = match (chart.y_range.map(|range| range.map(|y| y_scale.place(y))), y_scale) {
+            (Some(given), _) if given.iter().all(|y| y.is_finite()) => given,
+            (_, AxisScale::Log10) => range(finite.iter().map(|p| p.1)),
+            (_, AxisScale::Linear) => {
+                let top = finite.iter().map(|p| p.1).fold(0.0, f64::max);
+                [0.0, if top > 0.0 { 1.05 * top } else { 1.0 }]
+            }
+        };
+        Self { x_scale, y_scale, x, y }
     }
 
     fn at(&self, x: f64, y: f64) -> Option<(f64, f64)> {
-        let x = if self.x_scale == XScale::Log10 { x.log10() } else { x };
+        let (x, y) = (self.x_scale.place(x), self.y_scale.place(y));
+        if !x.is_finite() || !y.is_finite() {
+            return None;
+        }
         let part = |v: f64, [from, to]: [f64; 2]| (v - from) / (to - from);
         let [left, right, top, bottom] = MARGINS;
         let px = left + part(x, self.x) * (WIDTH - left - right);
@@ -117,21 +151,12 @@ impl Frame {
         (px.is_finite() && py.is_finite()).then_some((px, py))
     }
 
-    fn x_ticks(&self) -> Vec<f64> {
-        match self.x_scale {
-            XScale::Linear => ticks(self.x),
-            XScale::Log10 => {
-                let powers = self.x[0].ceil() as i32..=self.x[1].floor() as i32;
-                powers.map(|p| 10f64.powi(p)).collect()
-            }
-        }
-    }
-
     fn draw_axes(&self, svg: &mut String, chart: &LineChart) {
         let [left, right, top, bottom] = MARGINS;
         let (x1, y1) = (WIDTH - right, HEIGHT - bottom);
-        for tick in self.x_ticks() {
-            let Some((x, _)) = self.at(tick, self.y[0]) else { continue };
+        for tick in self.x_scale.ticks(self.x) {
+            let part = (self.x_scale.place(tick) - self.x[0]) / (self.x[1] - self.x[0]);
+            let x = left + part * (x1 - left);
             let label = number(tick);
             put(svg, format_args!("<path d=\"M{x:.2} {top}V{y1}\" stroke=\"#ddd\"/>"));
             put(
@@ -139,8 +164,8 @@ impl Frame {
                 format_args!("<text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\">{label}</text>", y1 + 17.0),
             );
         }
-        for tick in ticks(self.y) {
-            let part = (tick - self.y[0]) / (self.y[1] - self.y[0]);
+        for tick in self.y_scale.ticks(self.y) {
+            let part = (self.y_scale.place(tick) - self.y[0]) / (self.y[1] - self.y[0]);
             let y = y1 - part * (y1 - top);
             let label = number(tick);
             put(svg, format_args!("<path d=\"M{left} {y:.2}H{x1}\" stroke=\"#ddd\"/>"));
@@ -239,6 +264,11 @@ fn ticks([from, to]: [f64; 2]) -> Vec<f64> {
 
 /// A tick's value without the digits that rounding left.
 fn number(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 {
+        let digits = format!("{value:.2e}");
+        let (mantissa, power) = digits.split_once('e').unwrap_or((&digits, "0"));
+        return format!("{}e{power}", mantissa.trim_end_matches('0').trim_end_matches('.'));
+    }
     let rounded = format!("{value:.6}");
     rounded.trim_end_matches('0').trim_end_matches('.').into()
 }
@@ -276,20 +306,32 @@ mod tests {
     }
 
     #[test]
+    fn logarithmic_ticks_are_powers_of_ten_or_what_lies_between() {
+        let labels = |range| AxisScale::Log10.ticks(range).into_iter().map(number).collect::<Vec<_>>();
+        assert_eq!(labels([-5.2, -1.9]), ["1e-5", "1e-4", "0.001", "0.01"]);
+        assert_eq!(labels([-4.0, -3.2]), ["1e-4", "2e-4", "5e-4"]);
+    }
+
+    #[test]
+    fn a_decade_has_the_same_height_everywhere() {
+        let points = vec![(1.0, 1e-4), (2.0, 1e-2), (3.0, 0.0), (4.0, 1.0)];
+        let series = vec![Series { name: "s".into(), points }];
+        let chart = LineChart { y_scale: AxisScale::Log10, series, ..LineChart::default() };
+        let frame = Frame::fit(&chart);
+        let height = |y: f64| frame.at(1.0, y).unwrap().1;
+        assert!((height(1e-4) - height(1e-2) - (height(1e-2) - height(1.0))).abs() < 1e-9);
+        assert_eq!(frame.at(1.0, 0.0), None);
+    }
+
+    #[test]
     fn odd_data_makes_a_chart_all_the_same() {
         let series = |points: &[(f64, f64)]| Series { name: "s".into(), points: points.to_vec() };
         for points in
             [&[][..], &[(1.0, 1.0)], &[(f64::NAN, 1.0), (0.0, f64::INFINITY)], &[(0.0, 0.0), (10.0, 3.0)]]
         {
-            for x_scale in [XScale::Linear, XScale::Log10] {
-                let chart = LineChart {
-                    title: String::new(),
-                    x_label: String::new(),
-                    y_label: String::new(),
-                    x_scale,
-                    y_range: None,
-                    series: vec![series(points)],
-                };
+            for scale in [AxisScale::Linear, AxisScale::Log10] {
+                let series = vec![series(points)];
+                let chart = LineChart { x_scale: scale, y_scale: scale, series, ..LineChart::default() };
                 let svg = chart.to_svg();
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
             }

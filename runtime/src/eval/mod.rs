@@ -16,7 +16,7 @@ mod histogram;
 mod report;
 mod summary;
 
-pub use chart::{LineChart, Series, XScale};
+pub use chart::{AxisScale, LineChart, Series};
 pub use cmc::{cmc_curve, correct_match_distances, match_ranks};
 pub use curve::{ErrorCurve, curves_csv, curves_from_csv};
 pub use geodesic_error::{SymmetricErrors, geodesic_errors, symmetric_geodesic_errors};

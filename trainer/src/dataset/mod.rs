@@ -40,7 +40,7 @@ pub enum Correspondence {
     /// Line `i` of a `.vts` file holds the 1-based vertex of point `i`, 0 where the shape lacks it.
     Vts(PathBuf),
     /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place; the shape lacks
-    /// it where none is within 0.02 sqrt(area of the template), as in a hole of a scan.
+    /// it where none is within 0.02 sqrt(area), or an edge of a coarse scan, as in a hole.
     NearestTo(PathBuf),
     /// Line `v` of a SHREC'16 `.baryc_gt` file says where vertex `v` lies on the whole shape (the second path).
     Barycentric(PathBuf, PathBuf),
@@ -173,7 +173,9 @@ impl ShapeEntry {
 const NEAR: f64 = 0.02;
 
 fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
-    let limit = NEAR * template.scale();
+    // An even triangulation of n vertices has edges of about sqrt(area / n).
+    let edge = 1.0 / (mesh.n_vertices() as f64).sqrt();
+    let limit = NEAR.max(edge) * template.scale();
     let nearest = fmnet::mesh::nearest_vertices(mesh.vertices(), template.vertices());
     let near = |(&p, v): (&[f64; 3], u32)| match vec3::distance(p, mesh.vertices()[v as usize]) <= limit {
         true => v,
@@ -202,3 +204,6 @@ fn vts_points(path: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,6 +17,9 @@ mod polygonize;
 mod random;
 mod scan;
 mod scan_files;
+mod smooth;
+#[cfg(test)]
+mod tests;
 mod visibility;
 mod volume;
 

@@ -1,12 +1,13 @@
 //! What a 3D scanner would have made of a registered shape.
 //!
-//! The registration's volume is sampled on a turned grid, parts that nearly touch grow together ([`ScanOptions::contact`]), and
+//! The registration is rounded between its vertices, its volume is sampled on a turned grid, parts that nearly touch grow together ([`ScanOptions::contact`]), and
 //! the surface is polygonised and decimated: nothing of the template's connectivity remains. What no camera sees is left open
 //! in part, further holes are made, the surface gets noise, and a few stray pieces float around it.
 
 use super::carve::{carve, disc, largest_component, patches};
 use super::polygonize::polygonize;
 use super::random::{direction, generator, normal, uniform, weighted};
+use super::smooth::refine;
 use super::visibility::{seen, vertex_normals};
 use super::volume::Volume;
 use super::{SimulateError, check};
@@ -44,6 +45,10 @@ pub struct ScanOptions {
     /// Vertices before holes are made, 500 to 60000 [default: 15000, the size that training decimates scans to]
     #[arg(long, default_value_t = Self::default().vertices, hide_default_value = true)]
     pub vertices: usize,
+    /// Spacing of the grid that the shape is sampled on, at most, relative to sqrt(area), 0.0015 to 0.05; what is thinner is lost
+    /// [default: 0.0045, half a child's finger]
+    #[arg(long, default_value_t = Self::default().detail, hide_default_value = true)]
+    pub detail: f64,
     /// Surfaces that come nearer than this, relative to sqrt(area), grow together, as a hand on a hip; 0 (none) to 0.05
     /// [default: 0.01, on a person a finger's width]
     #[arg(long, default_value_t = Self::default().contact, hide_default_value = true)]
@@ -55,7 +60,7 @@ pub struct ScanOptions {
     /// The axis that leads away from the floor; the cameras stand around it [default: y, as in FAUST]
     #[arg(long, value_enum, default_value_t = Self::default().up, hide_default_value = true)]
     pub up: Axis,
-    /// Further holes anywhere, at most, 0 to 100; each scan has a random number of them [default: 2]
+    /// Further holes anywhere, at most, 0 to 100; each scan has a random number of them [default: 1]
     #[arg(long, default_value_t = Self::default().holes, hide_default_value = true)]
     pub holes: usize,
     /// Radius of the largest of these holes, relative to sqrt(area), 0.005 to 0.3 [default: 0.04]
@@ -77,10 +82,11 @@ impl Default for ScanOptions {
     fn default() -> Self {
         Self {
             vertices: 15_000,
+            detail: 0.0045,
             contact: 0.01,
             hidden: 0.6,
             up: Axis::Y,
-            holes: 2,
+            holes: 1,
             hole_radius: 0.04,
             noise: 6e-4,
             pieces: 3,
@@ -94,6 +100,7 @@ impl ScanOptions {
     pub fn check(&self) -> Result<(), SimulateError> {
         let vertices = (500..=60_000).contains(&self.vertices);
         check("vertices", vertices, self.vertices, "from 500 to 60000")?;
+        check("detail", (0.0015..=0.05).contains(&self.detail), self.detail, "from 0.0015 to 0.05")?;
         check("contact", (0.0..=0.05).contains(&self.contact), self.contact, "from 0 to 0.05")?;
         check("hidden", (0.0..=1.0).contains(&self.hidden), self.hidden, "from 0 to 1")?;
         check("holes", self.holes <= 100, self.holes, "from 0 to 100")?;
@@ -106,10 +113,8 @@ impl ScanOptions {
 
 /// Smallest area of a hidden patch that may stay open, relative to the area.
 const MIN_PATCH: f64 = 5e-4;
-/// Cells of the grid in an edge of the scan: fine enough for details, coarse enough for memory.
+/// Cells of the grid in an edge of the scan, at least.
 const CELLS_PER_EDGE: f64 = 2.0;
-/// Grids are never coarser than this, relative to sqrt(area): thinner than a child's finger.
-const COARSEST: f64 = 0.0045;
 /// Largest turn of the grid against the shape, in radians; more would waste memory on a longer box.
 const TURN: f64 = 0.4;
 
@@ -146,10 +151,10 @@ fn remesh(
     rng: &mut ChaCha8Rng,
 ) -> Result<Mesh, SimulateError> {
     let (axis, angle) = (direction(rng), uniform(rng, -TURN, TURN));
-    let turned = transformed(registration, rotation(axis, angle), 1.0, [0.0; 3]);
+    let turned = transformed(&refine(registration), rotation(axis, angle), 1.0, [0.0; 3]);
     // An even triangulation by equilateral triangles of side s has 2 / (sqrt(3) s^2) vertices per area.
     let edge = (2.0 / (3f64.sqrt() * options.vertices as f64)).sqrt();
-    let cell = unit * (edge / CELLS_PER_EDGE).min(COARSEST);
+    let cell = unit * (edge / CELLS_PER_EDGE).min(options.detail);
     let radius = 0.5 * options.contact * unit;
     let mut volume = Volume::new(&turned, cell, radius + 2.0 * cell);
     if radius > 0.0 {

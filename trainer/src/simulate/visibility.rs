@@ -11,7 +11,7 @@ const PIXELS: usize = 384;
 /// Cameras around the shape, at each of the heights.
 const AROUND: usize = 8;
 /// Heights of the cameras above the floor, relative to the shape's.
-const HEIGHTS: [f64; 3] = [0.05, 0.5, 1.1];
+const HEIGHTS: [f64; 3] = [0.05, 0.6, 1.6];
 /// Distance of the cameras from the shape's axis, relative to the diagonal of its box.
 const DISTANCE: f64 = 1.0;
 /// Cosine of the steepest angle between normal and line of sight at which stereo still measures.

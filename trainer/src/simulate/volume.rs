@@ -150,16 +150,32 @@ impl Volume {
 
 /// Where the line along the last axis through `(x, y)` crosses a triangle, and whether it goes in (1) or out (-1).
 fn crossing([a, b, c]: &[Vec3; 3], x: f64, y: f64) -> Option<(f64, i32)> {
-    // Each edge is taken from its lower end, so that the two triangles at it decide alike.
-    let side = |p: &Vec3, q: &Vec3| {
-        let cross = |p: &Vec3, q: &Vec3| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
-        if (p[0], p[1]) < (q[0], q[1]) { cross(p, q) } else { -cross(q, p) }
-    };
-    let [u, v, w] = [side(b, c), side(c, a), side(a, b)];
-    let (up, down) = (u > 0.0 && v > 0.0 && w > 0.0, u < 0.0 && v < 0.0 && w < 0.0);
-    let z = (u * a[2] + v * b[2] + w * c[2]) / (u + v + w);
+    let [u, v, w] = [side(b, c, x, y), side(c, a, x, y), side(a, b, x, y)];
+    let turns = [u.1, v.1, w.1];
+    let sum = u.0 + v.0 + w.0;
+    if turns.contains(&0) || turns[0] != turns[1] || turns[1] != turns[2] || sum == 0.0 {
+        return None;
+    }
     // Counter-clockwise seen from above: the outside is above, the line leaves.
-    (up || down).then_some((z, if up { -1 } else { 1 }))
+    Some(((u.0 * a[2] + v.0 * b[2] + w.0 * c[2]) / sum, -turns[0]))
+}
+
+/// Twice the signed area of `p`, `q` and `(x, y)`, and its sign: 1 where the point is on the left of the edge. A point on the edge
+/// counts as moved a little along the first axis, and less along the second, so that a line through an edge or a vertex
+/// crosses exactly one of the triangles there (Edelsbrunner and Muecke 1990, Simulation of simplicity).
+fn side(p: &Vec3, q: &Vec3, x: f64, y: f64) -> (f64, i32) {
+    // Taken from the edge's lower end, so that the two triangles at it compute the same number.
+    if (p[0], p[1]) > (q[0], q[1]) {
+        let (area, sign) = side(q, p, x, y);
+        return (-area, -sign);
+    }
+    let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+    let area = dx * (y - p[1]) - dy * (x - p[0]);
+    let sign = [area, -dy, dx]
+        .into_iter()
+        .find(|&term| term != 0.0)
+        .map_or(0, |term| if term > 0.0 { 1 } else { -1 });
+    (area, sign)
 }
 
 /// Distance of a point to a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5: by Voronoi regions).
@@ -216,12 +232,10 @@ mod tests {
         let ball = icosphere(3);
         let pair = joined(&[&ball, &transformed(&ball, STRAIGHT, 1.0, [1.0, 0.1, 0.05])]);
         let volume = Volume::new(&pair, 0.1, 0.25);
-        let [i, j, k] = [0.5, 0.05, 0.02].map(|x: f64| x);
-        let node =
-            [i, j, k].map(|x| x).iter().zip(volume.origin).map(|(x, o)| ((x - o) / 0.1).round() as usize);
-        let node: Vec<usize> = node.collect();
+        let at = |axis: usize, x: f64| ((x - volume.origin[axis]) / volume.cell).round() as usize;
         let [_, ny, nz] = volume.size;
-        assert!(volume.values[(node[0] * ny + node[1]) * nz + node[2]] < 0.0, "the overlap is inside");
+        let overlap = (at(0, 0.5) * ny + at(1, 0.05)) * nz + at(2, 0.02);
+        assert!(volume.values[overlap] < 0.0, "the overlap is inside");
     }
 
     #[test]
@@ -243,6 +257,17 @@ mod tests {
             }
         }
         assert!(filled > 20, "{filled} nodes were filled");
+    }
+
+    #[test]
+    fn a_line_through_an_edge_or_a_vertex_crosses_once() {
+        // Four triangles around the origin, seen from above; with the two of each neighbour they tile a square.
+        let ring = [[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [-1.0, 0.0, 0.5], [0.0, -1.0, 0.5]];
+        let fan: Vec<[Vec3; 3]> = (0..4).map(|i| [[0.0, 0.0, 0.5], ring[i], ring[(i + 1) % 4]]).collect();
+        for (x, y) in [(0.0, 0.0), (0.5, 0.0), (0.0, -0.25), (0.1, 0.2), (-0.5, 0.0)] {
+            let found: Vec<_> = fan.iter().filter_map(|triangle| crossing(triangle, x, y)).collect();
+            assert_eq!(found, [(0.5, -1)], "{x} {y}");
+        }
     }
 
     #[test]

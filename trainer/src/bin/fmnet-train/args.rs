@@ -92,9 +92,10 @@ pub(crate) struct SimulateArgs {
 pub(crate) enum Simulated {
     /// What a 3D scanner would have made of registered shapes, in the layout of the FAUST scans
     ///
-    /// Writes OUT/scans/tr_scan_NNN.ply and OUT/registrations/tr_reg_NNN.ply, which `preprocess` and `train` take like real
-    /// scans. Each scan lies where its registration lies and has a triangulation of its own. Parts that nearly touch are
-    /// glued, some of what no camera sees is missing, and there are holes, noise and stray pieces.
+    /// Writes OUT/scans/tr_scan_NNN.ply and OUT/registrations/tr_reg_NNN.ply, which `preprocess`
+    /// and `train` take like real scans. Each scan lies where its registration lies and has a
+    /// triangulation of its own. Parts that nearly touch are glued, some of what no camera sees is
+    /// missing, and there are holes, noise and stray pieces.
     ///
     /// For scans as the paper trains on them:
     ///
@@ -114,9 +115,10 @@ pub(crate) enum Simulated {
     },
     /// Parts of a whole with holes or cut by a plane, in the layout of the SHREC'16 partial correspondence benchmark
     ///
-    /// Writes OUT/null/CLASS.off, the whole, and OUT/holes/holes_CLASS_shape_N.off with .baryc_gt (where on the whole each
-    /// vertex lies), likewise OUT/cuts. Each class of the dataset needs three poses: the first is the whole; parts 1 to 10,
-    /// for training, and the parts after them, for testing, are cut out of different ones.
+    /// Writes OUT/null/CLASS.off, the whole, and OUT/holes/holes_CLASS_shape_N.off with .baryc_gt
+    /// (where on the whole each vertex lies), likewise OUT/cuts. Each class of the dataset needs
+    /// three poses: the first is the whole; parts 1 to 10, for training, and the parts after them,
+    /// for testing, are cut out of different ones.
     ///
     ///   fmnet-train simulate parts TOSCA/dog data/dog-parts
     ///   fmnet-train train --dataset data/dog-parts --out runs/dog -k 100 --steps 1000

@@ -1,0 +1,233 @@
+//! Simulated scans and parts on small closed shapes.
+
+use super::*;
+use crate::dataset::{Dataset, MISSING, Split};
+use fmnet::Mesh;
+use fmnet::io::{Attributes, write_mesh};
+use fmnet::mesh::shapes::{bumpy_sphere, open_half_sphere, transformed};
+use fmnet::mesh::{Topology, nearest_vertices, vec3};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// A shape in pose number `pose`.
+fn shape(pose: usize) -> Mesh {
+    let stretch = [[1.0 + 0.1 * pose as f64, 0.0, 0.0], [0.0, 1.0, 0.05 * pose as f64], [0.0, 0.0, 1.0]];
+    transformed(&bumpy_sphere(3, 1), stretch, 1.0, [0.0; 3])
+}
+
+fn scan_options() -> ScanOptions {
+    ScanOptions { vertices: 900, detail: 0.015, ..ScanOptions::default() }
+}
+
+/// As the registration, but for the triangulation.
+fn unharmed() -> ScanOptions {
+    ScanOptions { contact: 0.0, hidden: 0.0, holes: 0, noise: 0.0, pieces: 0, ..scan_options() }
+}
+
+fn folder_of(names: &[&str]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (pose, name) in names.iter().enumerate() {
+        write_mesh(&folder.path().join(name), &shape(pose), &Attributes::default()).unwrap();
+    }
+    folder
+}
+
+fn quiet(_: usize, _: usize, _: &str) {}
+
+fn bytes(folder: &Path, file: &str) -> Vec<u8> {
+    std::fs::read(folder.join(file)).unwrap()
+}
+
+#[test]
+fn a_scan_has_the_surface_of_its_registration_and_other_vertices() {
+    let registration = shape(0);
+    let scan = simulate_scan(&registration, &unharmed(), 3).unwrap();
+    let topology = Topology::new(&scan);
+    assert!(topology.is_closed() && topology.is_manifold());
+    assert_eq!((scan.n_vertices(), topology.euler_characteristic()), (900, 2));
+    assert!((scan.area() / registration.area() - 1.0).abs() < 0.02);
+    // As far as two samplings of one surface: within half an edge, never at the same place.
+    let nearest = nearest_vertices(registration.vertices(), scan.vertices());
+    for (&p, v) in scan.vertices().iter().zip(nearest) {
+        let distance = vec3::distance(p, registration.vertices()[v as usize]) / registration.scale();
+        assert!(distance < 0.05 && distance > 1e-9, "{distance}");
+    }
+}
+
+#[test]
+fn scans_depend_on_seed_and_number_but_not_on_size() {
+    let registration = shape(0);
+    let scan = |mesh: &Mesh, seed, index| {
+        simulate_scan(mesh, &ScanOptions { seed, ..scan_options() }, index).unwrap()
+    };
+    let first = scan(&registration, 0, 0);
+    assert_eq!(first, scan(&registration, 0, 0));
+    assert_ne!(first, scan(&registration, 0, 1));
+    assert_ne!(first, scan(&registration, 1, 0));
+    // A power of two scales without rounding.
+    let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let large = scan(&transformed(&registration, straight, 64.0, [0.0; 3]), 0, 0);
+    assert_eq!(large, transformed(&first, straight, 64.0, [0.0; 3]));
+}
+
+#[test]
+fn damage_is_what_the_options_say() {
+    let registration = shape(0);
+    let scan = |options: ScanOptions| simulate_scan(&registration, &options, 0).unwrap();
+    let whole = scan(unharmed());
+    let open = |mesh: &Mesh| Topology::new(mesh).boundary_edges().len();
+    let components = |mesh: &Mesh| Topology::new(mesh).components().count;
+
+    let hidden = scan(ScanOptions { hidden: 1.0, up: Axis::Z, ..unharmed() });
+    let bottom = |mesh: &Mesh| mesh.vertices().iter().map(|p| p[2]).fold(f64::INFINITY, f64::min);
+    assert!(open(&hidden) > 0 && bottom(&hidden) > bottom(&whole), "the cameras do not see the bottom");
+
+    let noisy = scan(ScanOptions { noise: 1e-3, ..unharmed() });
+    let square = |(p, q): (&[f64; 3], &[f64; 3])| vec3::distance(*p, *q).powi(2);
+    let sum: f64 = whole.vertices().iter().zip(noisy.vertices()).map(square).sum();
+    let deviation = (sum / whole.n_vertices() as f64).sqrt() / registration.scale();
+    assert!((deviation - 1e-3).abs() < 1e-9, "{deviation}");
+
+    let holes: usize = (0..4)
+        .map(|i| open(&simulate_scan(&registration, &ScanOptions { holes: 5, ..unharmed() }, i).unwrap()))
+        .sum();
+    assert!(holes > 0);
+    let stray: usize = (0..4)
+        .map(|i| {
+            components(&simulate_scan(&registration, &ScanOptions { pieces: 5, ..unharmed() }, i).unwrap())
+        })
+        .sum();
+    assert!(stray > 4 && components(&whole) == 1);
+}
+
+#[test]
+fn what_cannot_be_scanned_is_said() {
+    let open = simulate_scan(&open_half_sphere(2), &scan_options(), 0).unwrap_err();
+    assert!(matches!(open, SimulateError::NotClosed { faces: 1, .. }), "{open}");
+    let none = simulate_scan(&Mesh::default(), &scan_options(), 0).unwrap_err();
+    assert!(matches!(none, SimulateError::Empty), "{none}");
+    let options = ScanOptions { noise: 0.5, ..scan_options() };
+    assert!(
+        simulate_scan(&shape(0), &options, 0).unwrap_err().to_string().starts_with("option noise is 0.5")
+    );
+}
+
+#[test]
+fn parts_are_connected_and_of_the_wanted_size() {
+    let whole = shape(0);
+    let options = PartOptions { min_area: 0.4, max_area: 0.6, ..PartOptions::default() };
+    for kind in [PartKind::Holes, PartKind::Cuts] {
+        let mut shares = BTreeSet::new();
+        for index in 0..8 {
+            let part = cut_part(&whole, kind, &options, index).unwrap();
+            let share = part.mesh.area() / whole.area();
+            assert!((0.4..=0.6).contains(&share), "{kind:?} {index}: {share}");
+            shares.insert((1e9 * share) as u64);
+            assert_eq!(Topology::new(&part.mesh).components().count, 1);
+            for (&p, &origin) in part.mesh.vertices().iter().zip(&part.origin) {
+                assert_eq!(p, whole.vertices()[origin as usize]);
+            }
+            assert_eq!(part, cut_part(&whole, kind, &options, index).unwrap());
+        }
+        assert_eq!(shares.len(), 8, "every part is another one");
+    }
+    let narrow = PartOptions { min_area: 0.5, max_area: 0.4, ..options };
+    assert!(
+        cut_part(&whole, PartKind::Cuts, &narrow, 0).unwrap_err().to_string().starts_with("option max-area")
+    );
+}
+
+#[test]
+fn written_scans_are_read_as_faust_scans() {
+    let data = folder_of(&["tr_reg_000.ply", "tr_reg_059.ply", "tr_reg_060.ply", "tr_reg_085.ply"]);
+    let out = tempfile::tempdir().unwrap();
+    let dataset = Dataset::open(data.path()).unwrap();
+    let splits = [Split::Train, Split::Validation];
+    assert_eq!(write_scans(&dataset, &splits, out.path(), &scan_options(), &quiet).unwrap(), 3);
+    let scans = Dataset::open(out.path()).unwrap();
+    assert_eq!(scans.layout, "FAUST scans");
+    let found: Vec<(&str, Split)> = scans.shapes.iter().map(|s| (s.name.as_str(), s.split)).collect();
+    let expected =
+        [("tr_scan_000", Split::Train), ("tr_scan_059", Split::Train), ("tr_scan_060", Split::Validation)];
+    assert_eq!(found, expected);
+    for (pose, scan) in scans.shapes.iter().enumerate() {
+        let (mesh, registration) = (scan.read().unwrap(), shape(pose));
+        let points = scan.points(&mesh).unwrap();
+        assert_eq!(points.len(), registration.n_vertices());
+        let near = |(&p, &v): (&[f64; 3], &u32)| {
+            v == MISSING || vec3::distance(p, mesh.vertices()[v as usize]) < 0.04 * registration.scale()
+        };
+        assert!(registration.vertices().iter().zip(&points).all(near));
+        let there = points.iter().filter(|&&v| v != MISSING).count();
+        assert!(there * 3 > points.len() * 2, "{there} of {} points", points.len());
+    }
+
+    // An interrupted run goes on; another one does not mix with it.
+    let before = bytes(out.path(), "scans/tr_scan_059.ply");
+    std::fs::remove_file(out.path().join("scans/tr_scan_059.ply")).unwrap();
+    write_scans(&dataset, &splits, out.path(), &scan_options(), &quiet).unwrap();
+    assert_eq!(bytes(out.path(), "scans/tr_scan_059.ply"), before);
+    let other = ScanOptions { seed: 7, ..scan_options() };
+    let error = write_scans(&dataset, &splits, out.path(), &other, &quiet).unwrap_err();
+    assert!(error.to_string().contains("simulation.toml"), "{error}");
+}
+
+#[test]
+fn scans_of_other_datasets_keep_their_split() {
+    let data = folder_of(&["mesh000.off", "mesh001.off", "mesh060.off"]);
+    let dataset = Dataset::open(data.path()).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    write_scans(&dataset, &[Split::Train, Split::Test], out.path(), &scan_options(), &quiet).unwrap();
+    let scans = Dataset::open(out.path()).unwrap();
+    let found: Vec<(&str, Split)> = scans.shapes.iter().map(|s| (s.name.as_str(), s.split)).collect();
+    let expected =
+        [("tr_scan_000", Split::Train), ("tr_scan_001", Split::Train), ("tr_scan_080", Split::Test)];
+    assert_eq!(found, expected);
+
+    let mixed = folder_of(&["cat0.off", "dog0.off"]);
+    let mixed = Dataset::open(mixed.path()).unwrap();
+    let error = write_scans(&mixed, &[Split::Train], out.path(), &scan_options(), &quiet).unwrap_err();
+    assert!(error.to_string().contains("cat0 and dog0"), "{error}");
+}
+
+#[test]
+fn written_parts_are_read_as_shrec16() {
+    let data = folder_of(&["dog0.off", "dog1.off", "dog2.off", "dog3.off"]);
+    let out = tempfile::tempdir().unwrap();
+    let options = PartOptions { test_parts: 3, ..PartOptions::default() };
+    let dataset = Dataset::open(data.path()).unwrap();
+    assert_eq!(write_parts(&dataset, out.path(), &options, &quiet).unwrap(), 26);
+    let parts = Dataset::open(out.path()).unwrap();
+    assert_eq!((parts.layout, parts.shapes.len()), ("SHREC'16 partial", 27));
+    let pose_of = |mesh: &Mesh| {
+        (0..4).find(|&pose| {
+            let whole = shape(pose);
+            mesh.vertices().iter().all(|p| whole.vertices().contains(p))
+        })
+    };
+    for part in parts.shapes.iter().filter(|s| s.partial) {
+        let mesh = part.read().unwrap();
+        let pose = pose_of(&mesh).unwrap();
+        let expected = if part.split == Split::Train { 1..3 } else { 3..4 };
+        assert!(expected.contains(&pose), "{} is of pose {pose}", part.name);
+        let points = part.points(&mesh).unwrap();
+        assert_eq!(points.len(), shape(0).n_vertices());
+        let found = points.iter().enumerate().filter(|(_, v)| **v != MISSING);
+        assert_eq!(found.clone().count(), mesh.n_vertices());
+        for (point, &vertex) in found {
+            assert_eq!(mesh.vertices()[vertex as usize], shape(pose).vertices()[point]);
+        }
+    }
+    for kind in ["holes", "cuts"] {
+        let of_kind = || parts.shapes.iter().filter(|s| s.name.starts_with(kind));
+        assert_eq!(of_kind().filter(|s| s.split == Split::Train).count(), 10);
+        assert_eq!(of_kind().filter(|s| s.split == Split::Test).count(), 3);
+    }
+    let whole = parts.shapes.iter().find(|s| !s.partial).unwrap();
+    assert_eq!((whole.name.as_str(), whole.read().unwrap()), ("dog", shape(0)));
+
+    let few = folder_of(&["cat0.off", "cat1.off"]);
+    let few = Dataset::open(few.path()).unwrap();
+    let error = write_parts(&few, &out.path().join("few"), &options, &quiet).unwrap_err();
+    assert!(error.to_string().contains("class cat has 2 shapes"), "{error}");
+}
