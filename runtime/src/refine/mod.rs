@@ -1,6 +1,7 @@
 //! Refinement of a map: spectral ICP, ZoomOut, the product manifold filter.
 
 mod icp;
+mod pmf;
 mod sampling;
 mod zoomout;
 
@@ -10,6 +11,7 @@ use crate::point_map::{PointMap, RecoverError, search::SearchError};
 use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
+pub use pmf::{PmfInfo, PmfOptions, pmf};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.
@@ -33,6 +35,16 @@ pub enum RefineError {
         option: &'static str,
         /// Its value.
         value: usize,
+        /// The values allowed.
+        range: String,
+    },
+    /// An option that is a real number is out of its range.
+    #[error("{option} is {value}, but must be {range}")]
+    RealOption {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: f64,
         /// The values allowed.
         range: String,
     },
