@@ -1,9 +1,11 @@
 //! From averages to an assignment: which targets a source vertex may take, at what gain, and what to do with the rest.
 
+use super::PmfDescriptors;
 use super::auction::{Gains, NONE, assign};
-use super::neighborhood::{Neighborhoods, squared_distance};
+use super::neighborhood::Neighborhoods;
 use crate::Matrix;
 use crate::point_map::PointMap;
+use crate::point_map::search::squared_distance;
 use rayon::prelude::*;
 
 /// A vertex goes without a match rather than take one that is worse than its worst candidate by so many squared spacings.
@@ -11,8 +13,8 @@ const MARGIN: f64 = 100.0;
 /// The auction's precision, in squared spacings.
 const PRECISION: f64 = 0.0005;
 /// Neighbours of a vertex whose matches the search for candidates starts from, and targets around each of these.
-const STARTS: usize = 12;
-const AROUND_START: usize = 48;
+const STARTS: usize = 6;
+const AROUND_START: usize = 8;
 /// Free targets that a vertex left over may take in one round of filling.
 const FREE_CANDIDATES: usize = 48;
 
@@ -23,18 +25,47 @@ pub(super) struct Assigner<'a> {
     candidates: usize,
     /// The median of the squared distance of a row to its nearest other.
     squared_spacing: f64,
+    descriptors: Option<DescriptorTerm<'a>>,
+}
+
+/// The part of the gain that compares pointwise descriptors.
+pub(super) struct DescriptorTerm<'a> {
+    source: &'a Matrix<f32>,
+    target: &'a Matrix<f32>,
+    /// Weight of the squared distance of two descriptors.
+    factor: f64,
+}
+
+impl<'a> DescriptorTerm<'a> {
+    /// `weight` is that of one squared distance as is usual between neighbours on the target.
+    pub(super) fn new(descriptors: PmfDescriptors<'a>, neighborhoods: &Neighborhoods, weight: f64) -> Self {
+        let PmfDescriptors { source, target } = descriptors;
+        let to_next = |vertex: u32| {
+            let next = neighborhoods.of(vertex).get(1).copied().unwrap_or(vertex);
+            descriptor_distance(target.row(vertex as usize), target.row(next as usize))
+        };
+        let usual = median((0..target.rows() as u32).map(to_next).collect());
+        Self { source, target, factor: weight / usual }
+    }
+
+    fn cost(&self, x: usize, y: u32) -> f64 {
+        self.factor * descriptor_distance(self.source.row(x), self.target.row(y as usize))
+    }
 }
 
 impl<'a> Assigner<'a> {
-    pub(super) fn new(rows: &'a Matrix, neighborhoods: &'a Neighborhoods, candidates: usize) -> Self {
+    pub(super) fn new(
+        rows: &'a Matrix,
+        neighborhoods: &'a Neighborhoods,
+        candidates: usize,
+        descriptors: Option<DescriptorTerm<'a>>,
+    ) -> Self {
         let to_next = |vertex: u32| {
             let next = neighborhoods.of(vertex).get(1).copied().unwrap_or(vertex);
             squared_distance(rows.row(vertex as usize), rows.row(next as usize))
         };
-        let mut spacings: Vec<f64> = (0..rows.rows() as u32).map(to_next).collect();
-        spacings.sort_unstable_by(f64::total_cmp);
-        let median = spacings[spacings.len() / 2];
-        Self { rows, neighborhoods, candidates, squared_spacing: if median > 0.0 { median } else { 1.0 } }
+        let squared_spacing = median((0..rows.rows() as u32).map(to_next).collect());
+        Self { rows, neighborhoods, candidates, squared_spacing, descriptors }
     }
 
     /// Whether a source of so many vertices gets an injective map.
@@ -52,7 +83,7 @@ impl<'a> Assigner<'a> {
             if present[x] != PointMap::UNMATCHED && !vertices.contains(&present[x]) {
                 vertices.push(present[x]);
             }
-            self.gains(averages.row(x), &vertices)
+            self.gains(averages.row(x), x, &vertices)
         };
         let rows = (0..averages.rows()).into_par_iter().map(row).collect();
         let gains = Gains::from_rows(rows, self.rows.rows());
@@ -116,7 +147,8 @@ impl<'a> Assigner<'a> {
     /// be enough targets.
     pub(super) fn fill(&self, averages: &Matrix, targets: &mut [u32]) {
         loop {
-            let open: Vec<usize> = (0..targets.len()).filter(|&x| targets[x] == PointMap::UNMATCHED).collect();
+            let open: Vec<usize> =
+                (0..targets.len()).filter(|&x| targets[x] == PointMap::UNMATCHED).collect();
             if open.is_empty() {
                 return;
             }
@@ -124,14 +156,14 @@ impl<'a> Assigner<'a> {
             let taken = targets.iter().filter(|&&t| t != PointMap::UNMATCHED);
             taken.for_each(|&t| is_free[t as usize] = false);
             let free: Vec<u32> = (0..is_free.len() as u32).filter(|&y| is_free[y as usize]).collect();
-            let rows = open.par_iter().map(|&x| self.free_candidates(averages.row(x), &free)).collect();
+            let rows = open.par_iter().map(|&x| self.free_candidates(averages.row(x), x, &free)).collect();
             let found = auction(&Gains::from_rows(rows, self.rows.rows()));
             open.into_iter().zip(found).for_each(|(x, target)| targets[x] = target);
         }
     }
 
-    fn free_candidates(&self, average: &[f64], free: &[u32]) -> Vec<(u32, f64)> {
-        let mut gains = self.gains(average, free);
+    fn free_candidates(&self, average: &[f64], x: usize, free: &[u32]) -> Vec<(u32, f64)> {
+        let mut gains = self.gains(average, x, free);
         if gains.len() > FREE_CANDIDATES {
             gains.select_nth_unstable_by(FREE_CANDIDATES - 1, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             gains.truncate(FREE_CANDIDATES);
@@ -140,9 +172,12 @@ impl<'a> Assigner<'a> {
         gains
     }
 
-    /// Minus the squared distances, in squared spacings, less that of the best.
-    fn gains(&self, average: &[f64], candidates: &[u32]) -> Vec<(u32, f64)> {
-        let gain = |&y: &u32| (y, -squared_distance(average, self.rows.row(y as usize)) / self.squared_spacing);
+    /// Minus the squared distances of embeddings, in squared spacings, and of descriptors, less those of the best.
+    fn gains(&self, average: &[f64], x: usize, candidates: &[u32]) -> Vec<(u32, f64)> {
+        let gain = |&y: &u32| {
+            let distance = squared_distance(average, self.rows.row(y as usize)) / self.squared_spacing;
+            (y, -distance - self.descriptors.as_ref().map_or(0.0, |term| term.cost(x, y)))
+        };
         let mut gains: Vec<(u32, f64)> = candidates.iter().map(gain).collect();
         let best = gains.iter().map(|entry| entry.1).fold(f64::NEG_INFINITY, f64::max);
         gains.iter_mut().for_each(|entry| entry.1 -= best);
@@ -154,4 +189,20 @@ fn auction(gains: &Gains) -> Vec<u32> {
     let worst = |person: usize| gains.row(person).map(|entry| entry.1).fold(0.0, f64::min);
     let reserve: Vec<f64> = (0..gains.n_persons()).map(|person| worst(person) - MARGIN).collect();
     assign(gains, &reserve, PRECISION)
+}
+
+/// The median, or 1 where it is 0.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().filter(|&median| median > 0.0).unwrap_or(1.0)
+}
+
+fn descriptor_distance(a: &[f32], b: &[f32]) -> f64 {
+    let mut sums = [0.0f32; 8];
+    for (x, y) in a.chunks(8).zip(b.chunks(8)) {
+        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *sum += (x - y) * (x - y);
+        }
+    }
+    sums.iter().map(|&sum| f64::from(sum)).sum()
 }

@@ -105,10 +105,10 @@ impl<'a> Auction<'a> {
     /// A quarter of the mean range of a person's gains: the precision of the first phase.
     fn spread(&self) -> f64 {
         let range = |person: usize| {
-            let (low, high) = self
-                .gains
-                .row(person)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, gain)| (low.min(gain), high.max(gain)));
+            let (low, high) =
+                self.gains.row(person).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, gain)| {
+                    (low.min(gain), high.max(gain))
+                });
             (high - low).max(0.0)
         };
         let n = self.gains.n_persons();
@@ -125,9 +125,8 @@ impl<'a> Auction<'a> {
                 bidders.push_back(loser);
             }
         }
-        let priced = |object: &u32| {
-            self.person_of[*object as usize] == NONE && self.prices[*object as usize] > 0.0
-        };
+        let priced =
+            |object: &u32| self.person_of[*object as usize] == NONE && self.prices[*object as usize] > 0.0;
         let mut sellers: VecDeque<u32> = (0..self.gains.n_objects as u32).filter(priced).collect();
         while let Some(object) = sellers.pop_front() {
             if let Some(left) = self.offer(object as usize, epsilon) {
@@ -217,7 +216,10 @@ mod tests {
             if object == NONE {
                 return reserve[person];
             }
-            assert!(!std::mem::replace(&mut taken[object as usize], true), "object {object} is assigned twice");
+            assert!(
+                !std::mem::replace(&mut taken[object as usize], true),
+                "object {object} is assigned twice"
+            );
             gains.row(person).find(|entry| entry.0 == object).expect("only gains are assigned").1
         };
         object_of.iter().enumerate().map(value).sum()
@@ -266,7 +268,8 @@ mod tests {
         let mate = |person: u32| (person * 7 + 5) % n;
         let row = |person: u32| {
             let gain = |object: u32| {
-                let cost = if object == mate(person) { 0.0 } else { 0.01 + f64::from(person ^ object) / 300.0 };
+                let cost =
+                    if object == mate(person) { 0.0 } else { 0.01 + f64::from(person ^ object) / 300.0 };
                 offsets[person as usize] + offsets[(n + object) as usize] - cost
             };
             (0..n).map(|object| (object, gain(object))).collect()

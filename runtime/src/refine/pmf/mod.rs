@@ -26,7 +26,7 @@ use crate::Matrix;
 use crate::fmap::functional_map_of;
 use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
-use assignment::Assigner;
+use assignment::{Assigner, DescriptorTerm};
 use neighborhood::{Neighborhoods, n_centers};
 use smooth::LocalCharts;
 
@@ -47,9 +47,11 @@ pub struct PmfOptions {
     pub neighbors_start: usize,
     /// Vertices in an affine fit in the last of these rounds. Range 4 to `neighbors_start`, default 10.
     pub neighbors_end: usize,
-    /// Targets that a source vertex can be assigned to, at least: those nearest to where its surroundings go. Range 1 and up,
-    /// default 32.
+    /// Targets that a source vertex can be assigned to: those nearest to where its surroundings go. Range 1 and up, default 64.
     pub candidates: usize,
+    /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
+    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.3.
+    pub descriptor_weight: f64,
 }
 
 impl Default for PmfOptions {
@@ -61,9 +63,19 @@ impl Default for PmfOptions {
             local_rounds: 6,
             neighbors_start: 24,
             neighbors_end: 10,
-            candidates: 32,
+            candidates: 64,
+            descriptor_weight: 0.3,
         }
     }
+}
+
+/// Pointwise descriptors of both shapes, of one width.
+#[derive(Clone, Copy, Debug)]
+pub struct PmfDescriptors<'a> {
+    /// Those of the source, `[n_source, d]`.
+    pub source: &'a Matrix<f32>,
+    /// Those of the target, `[n_target, d]`.
+    pub target: &'a Matrix<f32>,
 }
 
 /// What [`pmf`] did.
@@ -89,9 +101,11 @@ pub fn pmf(
     map: &PointMap,
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
+    descriptors: Option<PmfDescriptors>,
     options: &PmfOptions,
 ) -> Result<Refined<PmfInfo>, RefineError> {
     check(options)?;
+    check_descriptors(descriptors, basis_source.n(), basis_target.n())?;
     // Checks the point map.
     functional_map_of(map, &basis_source.truncated(1), &basis_target.truncated(1))?;
     if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
@@ -99,14 +113,17 @@ pub fn pmf(
     }
     let source = Embedding::new(basis_source, options.time_end, options.neighbors_start)?;
     let target = Embedding::new(basis_target, options.time_end, options.candidates)?;
+    let term =
+        || descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight));
     let around = &source.neighborhoods;
-    let mut filter = Filter { targets: map.targets.clone(), averages: Matrix::default(), changed: Vec::new() };
+    let mut filter =
+        Filter { targets: map.targets.clone(), averages: Matrix::default(), changed: Vec::new() };
     for time in log_steps(options.time_start, options.time_end, options.heat_rounds) {
         filter.averages = heat_average(&filter.targets, basis_source, basis_target, time)?;
         let blurred = scaled(&basis_target.eigenvectors, &decay(basis_target, time));
-        filter.assign(&Assigner::new(&blurred, &target.neighborhoods, options.candidates), around);
+        filter.assign(&Assigner::new(&blurred, &target.neighborhoods, options.candidates, term()), around);
     }
-    let assigner = Assigner::new(&target.rows, &target.neighborhoods, options.candidates);
+    let assigner = Assigner::new(&target.rows, &target.neighborhoods, options.candidates, term());
     let (first, last) = (options.neighbors_start as f64, options.neighbors_end as f64);
     for size in log_steps(first, last, options.local_rounds) {
         let charts = LocalCharts::new(&source.rows, around, size.round() as usize);
@@ -208,6 +225,19 @@ fn log_steps(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| from * ratio.powf((at(i) - at(0)) / (1.0 - at(0)))).collect()
 }
 
+fn check_descriptors(
+    descriptors: Option<PmfDescriptors>,
+    n_source: usize,
+    n_target: usize,
+) -> Result<(), RefineError> {
+    let Some(PmfDescriptors { source, target }) = descriptors else { return Ok(()) };
+    if source.rows() != n_source || target.rows() != n_target || source.cols() != target.cols() {
+        let found = [source.rows(), source.cols(), target.rows(), target.cols()];
+        return Err(RefineError::Descriptors { found, n_source, n_target });
+    }
+    Ok(())
+}
+
 fn check(options: &PmfOptions) -> Result<(), RefineError> {
     let bad = |option, value: f64, range: String| Err(RefineError::RealOption { option, value, range });
     if !(options.time_end > 0.0 && options.time_end.is_finite()) {
@@ -215,6 +245,9 @@ fn check(options: &PmfOptions) -> Result<(), RefineError> {
     }
     if !(options.time_start >= options.time_end && options.time_start.is_finite()) {
         return bad("time_start", options.time_start, format!("at least time_end, {}", options.time_end));
+    }
+    if !(options.descriptor_weight >= 0.0 && options.descriptor_weight.is_finite()) {
+        return bad("descriptor_weight", options.descriptor_weight, "0 or more".into());
     }
     let sizes = [
         ("neighbors_end", options.neighbors_end, 4),

@@ -1,7 +1,7 @@
 //! Nearest neighbours of every vertex in an embedding.
 
 use crate::Matrix;
-use crate::point_map::search::{SearchError, nearest_rows};
+use crate::point_map::search::{SearchError, nearest_rows, squared_distance};
 use rayon::prelude::*;
 
 /// Vertices in a cell, about.
@@ -55,8 +55,9 @@ pub(super) fn n_centers(n: usize) -> usize {
 
 /// The vertices of the cells nearest to a cell, itself first; more cells where they hold fewer than `size` vertices.
 fn members_around(centers: &Matrix, cells: &[Vec<u32>], cell: usize, size: usize) -> Vec<u32> {
-    let mut order: Vec<(f64, usize)> =
-        (0..cells.len()).map(|other| (squared_distance(centers.row(cell), centers.row(other)), other)).collect();
+    let mut order: Vec<(f64, usize)> = (0..cells.len())
+        .map(|other| (squared_distance(centers.row(cell), centers.row(other)), other))
+        .collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut members = Vec::new();
     for (rank, &(_, other)) in order.iter().enumerate() {
@@ -82,20 +83,6 @@ fn nearest_among(embedding: &Matrix, vertex: u32, among: &[u32], size: usize) ->
     }
     near.sort_unstable_by(order);
     near.into_iter().map(|entry| entry.1).collect()
-}
-
-/// In eight partial sums, which the compiler keeps in vector registers.
-pub(super) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 =
-        chunks_a.remainder().iter().zip(chunks_b.remainder()).map(|(x, y)| (x - y) * (x - y)).sum();
-    for (x, y) in chunks_a.zip(chunks_b) {
-        for t in 0..8 {
-            sums[t] += (x[t] - y[t]) * (x[t] - y[t]);
-        }
-    }
-    rest + sums.iter().sum::<f64>()
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Local averages of a map: where the neighbours of a vertex go says where it goes.
 
-use super::neighborhood::{Neighborhoods, squared_distance};
+use super::neighborhood::Neighborhoods;
 use crate::Matrix;
+use crate::point_map::search::squared_distance;
 use rayon::prelude::*;
 
 /// Rounds of the orthogonal iteration for the local coordinates.
@@ -62,7 +63,9 @@ impl Chart {
     fn kernel(&self, usable: impl Fn(u32) -> bool) -> Vec<(f64, u32)> {
         let entries: Vec<(f64, [f64; 3], u32)> = (0..self.vertices.len())
             .filter(|&i| usable(self.vertices[i]))
-            .map(|i| (self.weights[i], [1.0, self.coordinates[i][0], self.coordinates[i][1]], self.vertices[i]))
+            .map(|i| {
+                (self.weights[i], [1.0, self.coordinates[i][0], self.coordinates[i][1]], self.vertices[i])
+            })
             .collect();
         let mut normal = [[0.0; 3]; 3];
         for (weight, f, _) in &entries {
