@@ -17,7 +17,7 @@ use crate::fmap::{FmapInfo, FmapSolver, functional_map};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
 use crate::point_map::{PointMap, recover};
-use crate::refine::{IcpOptions, ZoomOutOptions, icp, zoomout};
+use crate::refine::{IcpOptions, PmfDescriptors, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::upscale::{
@@ -49,6 +49,9 @@ pub enum Refinement {
     /// ZoomOut (Melzi et al. 2019).
     #[default]
     Zoomout,
+    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with the descriptors: injective between working meshes
+    /// where the source has no more vertices.
+    Pmf,
 }
 
 /// How the map of decimated meshes becomes one of the full meshes.
@@ -99,6 +102,8 @@ pub struct MatchOptions {
 
 /// Eigenfunctions that ZoomOut goes up to.
 const ZOOMOUT_K: usize = 200;
+/// Eigenfunctions of the product manifold filter.
+const PMF_K: usize = 500;
 /// Eigenfunctions of the full meshes in upscaling.
 const UPSCALE_K: usize = 100;
 
@@ -161,7 +166,11 @@ impl Matcher {
         shape_options.decimate = options.decimate.unwrap_or(shape_options.decimate);
         let default_refinement = if network.is_some() { Refinement::Zoomout } else { Refinement::None };
         let refinement = options.refinement.unwrap_or(default_refinement);
-        shape_options.k = if refinement == Refinement::Zoomout { k.max(ZOOMOUT_K) } else { k };
+        shape_options.k = match refinement {
+            Refinement::None | Refinement::Icp => k,
+            Refinement::Zoomout => k.max(ZOOMOUT_K),
+            Refinement::Pmf => k.max(PMF_K),
+        };
         let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver);
         Ok(Self {
             shape_options,
@@ -251,7 +260,7 @@ impl Matcher {
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
         let raw =
             timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
-        let map = self.refine(&source.shape, &target.shape, &functional_map, raw, &pair, observer)?;
+        let map = self.refine(source, target, &functional_map, raw, &pair, observer)?;
         drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
@@ -260,31 +269,41 @@ impl Matcher {
 
     fn refine(
         &self,
-        source: &Shape,
-        target: &Shape,
+        source: &DescribedShape,
+        target: &DescribedShape,
         functional_map: &Matrix,
         raw: PointMap,
         pair: &str,
         observer: Observer,
     ) -> Result<PointMap, Error> {
-        match self.refinement {
-            Refinement::None => Ok(raw),
+        let at_k = |described: &DescribedShape| described.shape.basis.at_unit_area(self.k);
+        let whole = |described: &DescribedShape| {
+            let basis = &described.shape.basis;
+            basis.at_unit_area(basis.k())
+        };
+        let by_zoomout = || {
+            timed(observer, pair, "zoomout", || {
+                zoomout(&raw, &whole(source), &whole(target), &ZoomOutOptions::default())
+            })
+        };
+        let map = match self.refinement {
+            Refinement::None => raw,
             Refinement::Icp => {
-                let (basis_source, basis_target) =
-                    (source.basis.at_unit_area(self.k), target.basis.at_unit_area(self.k));
-                let refined = timed(observer, pair, "icp", || {
-                    icp(functional_map, &basis_source, &basis_target, &IcpOptions::default())
-                })?;
-                Ok(refined.map)
+                let refine = || icp(functional_map, &at_k(source), &at_k(target), &IcpOptions::default());
+                timed(observer, pair, "icp", refine)?.map
             }
-            Refinement::Zoomout => {
-                let refined = timed(observer, pair, "zoomout", || {
-                    let whole = |shape: &Shape| shape.basis.at_unit_area(shape.basis.k());
-                    zoomout(&raw, &whole(source), &whole(target), &ZoomOutOptions::default())
-                })?;
-                Ok(refined.map)
+            Refinement::Zoomout => by_zoomout()?.map,
+            Refinement::Pmf => {
+                let start = by_zoomout()?.map;
+                let descriptors = PmfDescriptors { source: &source.descriptors, target: &target.descriptors };
+                let (basis_source, basis_target) = (whole(source), whole(target));
+                timed(observer, pair, "pmf", || {
+                    pmf(&start, &basis_source, &basis_target, Some(descriptors), &PmfOptions::default())
+                })?
+                .map
             }
-        }
+        };
+        Ok(map)
     }
 
     /// From the working meshes to the full ones, where they differ.

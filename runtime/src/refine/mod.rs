@@ -1,6 +1,7 @@
 //! Refinement of a map: spectral ICP, ZoomOut, the product manifold filter.
 
 mod icp;
+mod pmf;
 mod sampling;
 mod zoomout;
 
@@ -10,6 +11,7 @@ use crate::point_map::{PointMap, RecoverError, search::SearchError};
 use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
+pub use pmf::{PmfDescriptors, PmfInfo, PmfOptions, pmf};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.
@@ -35,6 +37,30 @@ pub enum RefineError {
         value: usize,
         /// The values allowed.
         range: String,
+    },
+    /// An option that is a real number is out of its range.
+    #[error("{option} is {value}, but must be {range}")]
+    RealOption {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// The values allowed.
+        range: String,
+    },
+    /// The descriptors are not those of the two shapes, or of different width.
+    #[error(
+        "descriptors are [{}, {}] and [{}, {}], but the shapes have {n_source} and {n_target} vertices; give those of \
+         both shapes, of one width",
+        found[0], found[1], found[2], found[3]
+    )]
+    Descriptors {
+        /// Rows and columns of the source's, then of the target's.
+        found: [usize; 4],
+        /// Vertices of the source.
+        n_source: usize,
+        /// Vertices of the target.
+        n_target: usize,
     },
     /// Not one source vertex has a match to start from.
     #[error("no source vertex is matched; refinement improves a map, it cannot start without one")]

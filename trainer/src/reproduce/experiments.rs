@@ -55,7 +55,9 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
             methods: vec![
                 trained("regularised", regularized, Refinement::None),
                 trained("regularised + ZoomOut", regularized, Refinement::Zoomout),
+                trained("regularised + PMF", regularized, Refinement::Pmf),
                 trained("FMNet", plain, Refinement::None),
+                trained("FMNet + PMF", plain, Refinement::Pmf),
                 trained("Siamese", siamese, Refinement::None),
                 TestMethod { label: "SHOT", training: None, k: 120, refinement: Refinement::None },
             ],

@@ -78,7 +78,8 @@ pub(crate) struct PipelineArgs {
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
     #[arg(long, value_name = "N|off", value_parser = decimation)]
     pub(crate) decimate: Option<Decimation>,
-    /// Refinement of the map [default: zoomout; none with SHOT]
+    /// Refinement of the map; pmf is zoomout and then the product manifold filter, which takes longer and makes
+    /// the map one-to-one where both meshes have equally many vertices [default: zoomout; none with SHOT]
     #[arg(long, value_enum)]
     pub(crate) refine: Option<RefineArg>,
     /// How the map of decimated meshes becomes one of the full meshes
@@ -229,6 +230,7 @@ pub(crate) enum RefineArg {
     None,
     Icp,
     Zoomout,
+    Pmf,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -287,6 +289,7 @@ impl PipelineArgs {
                 RefineArg::None => Refinement::None,
                 RefineArg::Icp => Refinement::Icp,
                 RefineArg::Zoomout => Refinement::Zoomout,
+                RefineArg::Pmf => Refinement::Pmf,
             }),
             upscaling: match self.upscale {
                 UpscaleArg::L21 => Upscaling::L21,

@@ -121,6 +121,11 @@ pub fn nearest_rows(queries: &Matrix, targets: &Matrix) -> Result<Nearest, Searc
     NearestRows::new(targets)?.nearest(queries)
 }
 
+/// The squared Euclidean distance of two vectors of one length.
+pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    Kernels::detect().squared_distance(a, b)
+}
+
 /// Points in a leaf, at most, and queries in a block: the cost of looking at all leaves falls with it, the
 /// cost of looking into those that are not excluded grows.
 fn leaf_size(n_targets: usize) -> usize {

@@ -255,6 +255,7 @@ pub(crate) enum RefineArg {
     None,
     Icp,
     Zoomout,
+    Pmf,
 }
 
 impl RefineArg {
@@ -264,6 +265,7 @@ impl RefineArg {
             Self::None => (Refinement::None, ""),
             Self::Icp => (Refinement::Icp, " + ICP"),
             Self::Zoomout => (Refinement::Zoomout, " + ZoomOut"),
+            Self::Pmf => (Refinement::Pmf, " + PMF"),
         }
     }
 }
