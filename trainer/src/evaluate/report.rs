@@ -2,7 +2,9 @@
 
 use super::{DescriptorFigures, EvaluateError, MeanSummary, MethodResult};
 use crate::dataset::Dataset;
-use fmnet::eval::{Block, ErrorCurve, Histogram, HtmlReport, LineChart, Section, Series, XScale, curves_csv};
+use fmnet::eval::{
+    AxisScale, Block, ErrorCurve, Histogram, HtmlReport, LineChart, Section, Series, curves_csv,
+};
 use fmnet::io::{IoError, write_atomically, write_point_map};
 use fmnet::render::pair_picture;
 use std::fmt::Write;
@@ -83,7 +85,8 @@ impl Chapter<'_> {
                 title: format!("{}: descriptors", self.title),
                 x_label: "Number of nearest descriptors".into(),
                 y_label: "% with the right match among them".into(),
-                x_scale: XScale::Linear,
+                x_scale: AxisScale::Linear,
+                y_scale: AxisScale::Linear,
                 y_range: Some([0.0, 100.0]),
                 series: cmc.collect(),
             },
@@ -98,7 +101,8 @@ impl Chapter<'_> {
                 title: format!("{}: distances of correct matches", self.title),
                 x_label: "Descriptor distance / mean of wrong matches".into(),
                 y_label: "% of correct matches".into(),
-                x_scale: XScale::Linear,
+                x_scale: AxisScale::Linear,
+                y_scale: AxisScale::Linear,
                 y_range: None,
                 series: histogram.collect(),
             },
