@@ -100,10 +100,8 @@ pub struct MatchOptions {
     pub cache: Option<PathBuf>,
 }
 
-/// Eigenfunctions that ZoomOut goes up to.
-const ZOOMOUT_K: usize = 200;
-/// Eigenfunctions of the product manifold filter.
-const PMF_K: usize = 500;
+/// Eigenfunctions that ZoomOut goes up to and the product manifold filter takes; 500 in the latter gained nothing.
+const REFINED_K: usize = 200;
 /// Eigenfunctions of the full meshes in upscaling.
 const UPSCALE_K: usize = 100;
 
@@ -168,8 +166,7 @@ impl Matcher {
         let refinement = options.refinement.unwrap_or(default_refinement);
         shape_options.k = match refinement {
             Refinement::None | Refinement::Icp => k,
-            Refinement::Zoomout => k.max(ZOOMOUT_K),
-            Refinement::Pmf => k.max(PMF_K),
+            Refinement::Zoomout | Refinement::Pmf => k.max(REFINED_K),
         };
         let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver);
         Ok(Self {
