@@ -96,8 +96,14 @@ mod tests {
         let centers: Vec<u32> = (0..30).map(|i| (i * 389 + 17) % 1200).collect();
         let found = Neighborhoods::new(&embedding, &centers, 12).unwrap();
         let all: Vec<u32> = (0..1200).collect();
-        let exact = (0..1200).filter(|&v| found.of(v) == nearest_among(&embedding, v, &all, 12)).count();
-        assert!(exact > 1190, "{exact}");
+        // On a grid many neighbours are equally far, so what counts is how far they are.
+        let is_near = |v: u32, other: u32| {
+            let distance = |w: u32| squared_distance(embedding.row(v as usize), embedding.row(w as usize));
+            let last = nearest_among(&embedding, v, &all, 12)[11];
+            distance(other) <= distance(last) * (1.0 + 1e-9)
+        };
+        let near: usize = (0..1200).map(|v| found.of(v).iter().filter(|&&w| is_near(v, w)).count()).sum();
+        assert!(near as f64 > 0.99 * (1200.0 * 12.0), "{near} of {}", 1200 * 12);
         assert!((0..1200).all(|v| found.of(v)[0] == v));
         let few = Neighborhoods::new(&embedding.select_rows(&[3, 9, 700]), &[0, 2], 12).unwrap();
         assert_eq!(few.of(1)[0], 1);
