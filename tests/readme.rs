@@ -44,8 +44,10 @@ fn commands(page: &Path) -> Vec<Words> {
     commands
 }
 
+/// The words of a command, without the variables set before it.
 fn words(command: &str) -> Words {
-    command.split_whitespace().filter(|word| !word.starts_with('#')).map(str::to_string).collect()
+    let words = command.split_whitespace().filter(|word| !word.starts_with('#'));
+    words.skip_while(|word| word.contains('=')).map(str::to_string).collect()
 }
 
 /// What a page's command is made to do here, in addition, so that it takes seconds.
