@@ -281,10 +281,13 @@ fn barycentric(folder: &Path) -> Target {
         split: Split::Train,
         partial: true,
     };
-    Target::new(vec!["1 1 0 0\n2 0.25 0.5 0.25\n8 0 0 1\n".into()], move |bytes| {
-        std::fs::write(&path, bytes).unwrap();
-        entry.points(&grid(2, 2)).is_ok()
-    })
+    Target::new(
+        vec![("1 1 0 0\n".repeat(grid(2, 2).n_vertices() - 2) + "2 0.25 0.5 0.25\n8 0 0 1\n").into()],
+        move |bytes| {
+            std::fs::write(&path, bytes).unwrap();
+            entry.points(&grid(2, 2)).is_ok()
+        },
+    )
 }
 
 fn configs(folder: &Path) -> Target {

@@ -152,7 +152,7 @@ mod tests {
         for (p, seen) in ball.vertices().iter().zip(seen) {
             if p[2] > -0.5 {
                 assert!(seen, "{p:?} is open to the cameras");
-            } else if p[2] < -0.97 {
+            } else if p[2] < -0.985 {
                 assert!(!seen, "{p:?} lies on the floor");
             }
         }

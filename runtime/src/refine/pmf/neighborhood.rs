@@ -89,11 +89,15 @@ fn nearest_among(embedding: &Matrix, vertex: u32, among: &[u32], size: usize) ->
 mod tests {
     use super::*;
     use crate::fmap::test_basis::rectangle;
+    use crate::refine::sampling::farthest_points;
 
     #[test]
     fn neighbors_are_those_of_a_scan() {
-        let embedding = rectangle(30, 40, 60).eigenvectors;
-        let centers: Vec<u32> = (0..30).map(|i| (i * 389 + 17) % 1200).collect();
+        let basis = rectangle(30, 40, 60);
+        let centers = farthest_points(&basis, n_centers(basis.n()));
+        // High frequencies count little, as in the embeddings of the filter.
+        let weight = |j: usize| 1.0 / (basis.eigenvalues[j] + basis.eigenvalues[1]);
+        let embedding = Matrix::from_fn(basis.n(), basis.k(), |i, j| basis.eigenvectors[(i, j)] * weight(j));
         let found = Neighborhoods::new(&embedding, &centers, 12).unwrap();
         let all: Vec<u32> = (0..1200).collect();
         // On a grid many neighbours are equally far, so what counts is how far they are.
