@@ -33,13 +33,13 @@ use smooth::LocalCharts;
 /// Options of [`pmf`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PmfOptions {
-    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 1e-2: a kernel as
+    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a kernel as
     /// wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.
     pub time_start: f64,
     /// Diffusion time in the last round with a heat kernel, and that of the target's kernel throughout. Above 0, at most
     /// `time_start`; default 3e-4.
     pub time_end: f64,
-    /// Rounds with a heat kernel, the times in even steps of their logarithm. Range 0 and up, default 8.
+    /// Rounds with a heat kernel, the times in even steps of their logarithm. Range 0 and up, default 6.
     pub heat_rounds: usize,
     /// Rounds that average by an affine fit to the nearest vertices. Range 0 and up, default 3.
     pub local_rounds: usize,
@@ -48,24 +48,24 @@ pub struct PmfOptions {
     /// Vertices in an affine fit in the last of these rounds. Range 4 to `neighbors_start`, default 10.
     pub neighbors_end: usize,
     /// Targets that a source vertex can be assigned to: those nearest to where its surroundings go. Range 1 and up, default
-    /// 256; wide kernels need many.
+    /// 128; wide kernels need many.
     pub candidates: usize,
     /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
-    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 1.
+    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
     pub descriptor_weight: f64,
 }
 
 impl Default for PmfOptions {
     fn default() -> Self {
         Self {
-            time_start: 1e-2,
+            time_start: 3e-3,
             time_end: 3e-4,
-            heat_rounds: 8,
+            heat_rounds: 6,
             local_rounds: 3,
             neighbors_start: 20,
             neighbors_end: 10,
-            candidates: 256,
-            descriptor_weight: 1.0,
+            candidates: 128,
+            descriptor_weight: 0.5,
         }
     }
 }
