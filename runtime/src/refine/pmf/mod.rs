@@ -20,14 +20,13 @@ mod smooth;
 #[cfg(test)]
 mod tests;
 
-use super::sampling::farthest_points;
 use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::functional_map_of;
 use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
 use assignment::{Assigner, DescriptorTerm};
-use neighborhood::{Neighborhoods, n_centers};
+use neighborhood::Neighborhoods;
 use smooth::LocalCharts;
 
 /// Options of [`pmf`].
@@ -112,8 +111,8 @@ pub fn pmf(
     if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
         return Err(RefineError::NothingMatched);
     }
-    let source = Embedding::new(basis_source, options.time_end, options.neighbors_start)?;
-    let target = Embedding::new(basis_target, options.time_end, options.candidates)?;
+    let source = Embedding::new(basis_source, options.time_end, options.neighbors_start);
+    let target = Embedding::new(basis_target, options.time_end, options.candidates);
     let term =
         || descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight));
     let around = &source.neighborhoods;
@@ -146,11 +145,10 @@ struct Embedding {
 }
 
 impl Embedding {
-    fn new(basis: &Eigenbasis, time: f64, neighbors: usize) -> Result<Self, RefineError> {
+    fn new(basis: &Eigenbasis, time: f64, neighbors: usize) -> Self {
         let rows = scaled(&basis.eigenvectors, &decay(basis, 0.5 * time));
-        let centers = farthest_points(basis, n_centers(basis.n()));
-        let neighborhoods = Neighborhoods::new(&rows, &centers, neighbors)?;
-        Ok(Self { rows, neighborhoods })
+        let neighborhoods = Neighborhoods::new(&rows, neighbors);
+        Self { rows, neighborhoods }
     }
 }
 
