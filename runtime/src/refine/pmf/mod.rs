@@ -20,26 +20,25 @@ mod smooth;
 #[cfg(test)]
 mod tests;
 
-use super::sampling::farthest_points;
 use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::functional_map_of;
 use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
 use assignment::{Assigner, DescriptorTerm};
-use neighborhood::{Neighborhoods, n_centers};
+use neighborhood::Neighborhoods;
 use smooth::LocalCharts;
 
 /// Options of [`pmf`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PmfOptions {
-    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 1e-2: a kernel as
+    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a kernel as
     /// wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.
     pub time_start: f64,
     /// Diffusion time in the last round with a heat kernel, and that of the target's kernel throughout. Above 0, at most
     /// `time_start`; default 3e-4.
     pub time_end: f64,
-    /// Rounds with a heat kernel, the times in even steps of their logarithm. Range 0 and up, default 8.
+    /// Rounds with a heat kernel, the times in even steps of their logarithm. Range 0 and up, default 6.
     pub heat_rounds: usize,
     /// Rounds that average by an affine fit to the nearest vertices. Range 0 and up, default 3.
     pub local_rounds: usize,
@@ -48,24 +47,24 @@ pub struct PmfOptions {
     /// Vertices in an affine fit in the last of these rounds. Range 4 to `neighbors_start`, default 10.
     pub neighbors_end: usize,
     /// Targets that a source vertex can be assigned to: those nearest to where its surroundings go. Range 1 and up, default
-    /// 256; wide kernels need many.
+    /// 128; wide kernels need many.
     pub candidates: usize,
     /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
-    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 1.
+    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
     pub descriptor_weight: f64,
 }
 
 impl Default for PmfOptions {
     fn default() -> Self {
         Self {
-            time_start: 1e-2,
+            time_start: 3e-3,
             time_end: 3e-4,
-            heat_rounds: 8,
+            heat_rounds: 6,
             local_rounds: 3,
             neighbors_start: 20,
             neighbors_end: 10,
-            candidates: 256,
-            descriptor_weight: 1.0,
+            candidates: 128,
+            descriptor_weight: 0.5,
         }
     }
 }
@@ -112,8 +111,8 @@ pub fn pmf(
     if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
         return Err(RefineError::NothingMatched);
     }
-    let source = Embedding::new(basis_source, options.time_end, options.neighbors_start)?;
-    let target = Embedding::new(basis_target, options.time_end, options.candidates)?;
+    let source = Embedding::new(basis_source, options.time_end, options.neighbors_start);
+    let target = Embedding::new(basis_target, options.time_end, options.candidates);
     let term =
         || descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight));
     let around = &source.neighborhoods;
@@ -146,11 +145,10 @@ struct Embedding {
 }
 
 impl Embedding {
-    fn new(basis: &Eigenbasis, time: f64, neighbors: usize) -> Result<Self, RefineError> {
+    fn new(basis: &Eigenbasis, time: f64, neighbors: usize) -> Self {
         let rows = scaled(&basis.eigenvectors, &decay(basis, 0.5 * time));
-        let centers = farthest_points(basis, n_centers(basis.n()));
-        let neighborhoods = Neighborhoods::new(&rows, &centers, neighbors)?;
-        Ok(Self { rows, neighborhoods })
+        let neighborhoods = Neighborhoods::new(&rows, neighbors);
+        Self { rows, neighborhoods }
     }
 }
 
