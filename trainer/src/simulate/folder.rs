@@ -5,7 +5,7 @@ use fmnet::Mesh;
 use fmnet::io::{Attributes, IoError, write_atomically, write_mesh};
 use serde::Serialize;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Tells what was simulated, and how.
 const RECORD: &str = "simulation.toml";
@@ -41,6 +41,6 @@ pub(super) fn claim<O: Serialize>(
 }
 
 /// Writes a mesh without attributes.
-pub(super) fn save(path: &PathBuf, mesh: &Mesh) -> Result<(), SimulateError> {
+pub(super) fn save(path: &Path, mesh: &Mesh) -> Result<(), SimulateError> {
     Ok(write_mesh(path, mesh, &Attributes::default())?)
 }

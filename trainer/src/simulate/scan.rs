@@ -135,7 +135,7 @@ pub fn simulate_scan(registration: &Mesh, options: &ScanOptions, index: u64) -> 
 
 fn closed(mesh: &Mesh) -> Result<(), SimulateError> {
     let topology = Topology::new(mesh);
-    let open = (0..topology.edges().len()).find(|&e| topology.n_faces_of(e) % 2 != 0);
+    let open = (0..topology.edges().len()).find(|&e| !topology.n_faces_of(e).is_multiple_of(2));
     match open {
         Some(e) => Err(SimulateError::NotClosed { edge: topology.edges()[e], faces: topology.n_faces_of(e) }),
         None if mesh.n_faces() == 0 => Err(SimulateError::Empty),
