@@ -292,7 +292,8 @@ impl Matcher {
             Refinement::Zoomout => by_zoomout()?.map,
             Refinement::Pmf => {
                 let start = by_zoomout()?.map;
-                let descriptors = PmfDescriptors { source: &source.descriptors, target: &target.descriptors };
+                // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
+                let descriptors = PmfDescriptors { source: &source.shape.shot, target: &target.shape.shot };
                 let (basis_source, basis_target) = (whole(source), whole(target));
                 timed(observer, pair, "pmf", || {
                     pmf(&start, &basis_source, &basis_target, Some(descriptors), &PmfOptions::default())
