@@ -13,6 +13,7 @@ use fmnet::synth::SynthError;
 use fmnet_trainer::checkpoint::CheckpointError;
 use fmnet_trainer::export::ExportError;
 use fmnet_trainer::precompute::PrepareError;
+use fmnet_trainer::simulate::SimulateError;
 use fmnet_trainer::train::TrainError;
 use std::process::ExitCode;
 
@@ -60,4 +61,5 @@ fn is_own_failure(error: &anyhow::Error) -> bool {
         || error.downcast_ref().is_some_and(unwritable)
         || matches!(error.downcast_ref(), Some(ExportError::Io(io)) if unwritable(io))
         || matches!(error.downcast_ref(), Some(SynthError::Write(io)) if unwritable(io))
+        || matches!(error.downcast_ref(), Some(SimulateError::Io(io)) if unwritable(io))
 }
