@@ -188,7 +188,7 @@ fn every_option_that_a_page_names_exists() {
     for command in ["demo", "match", "batch", "transfer", "features", "evaluate", "inspect"] {
         known.extend(help(infer(), &[command, "--help"]));
     }
-    for command in ["synth", "preprocess", "train", "export"] {
+    for command in ["synth", "preprocess", "train", "export", "evaluate", "reproduce", "simulate"] {
         known.extend(help(train(), &[command, "--help"]));
     }
     // Of cargo, its test harness and the scripts.
