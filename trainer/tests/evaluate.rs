@@ -7,13 +7,8 @@ use fmnet::mesh::shapes::{bumpy_sphere, transformed};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The binary beside the test's own folder.
 fn train() -> Command {
-    let test = std::env::current_exe().unwrap();
-    let folder = test.parent().unwrap().parent().unwrap();
-    let binary = folder.join(format!("fmnet-train{}", std::env::consts::EXE_SUFFIX));
-    assert!(binary.is_file(), "{} is not built; run the tests of the whole workspace", binary.display());
-    Command::new(binary)
+    Command::new(env!("CARGO_BIN_EXE_fmnet-train"))
 }
 
 fn succeed(command: &mut Command) -> String {
