@@ -16,7 +16,7 @@ use crate::events::{Event, Observer, timed};
 use crate::fmap::{FmapInfo, FmapSolver, functional_map};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
-use crate::point_map::{PointMap, recover};
+use crate::point_map::{Comparison, PointMap, recover, recover_by};
 use crate::refine::{IcpOptions, PmfDescriptors, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The pointwise descriptors that the functional map is computed from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum DescriptorKind {
     /// SHOT through the network of a model.
@@ -39,7 +39,7 @@ pub enum DescriptorKind {
 }
 
 /// What happens to the map of the working meshes before it is upscaled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refinement {
     /// Nothing: the raw map.
@@ -49,13 +49,13 @@ pub enum Refinement {
     /// ZoomOut (Melzi et al. 2019).
     #[default]
     Zoomout,
-    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with the descriptors: injective between working meshes
-    /// where the source has no more vertices.
+    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
+    /// meshes of equally many vertices, injective where the source has fewer.
     Pmf,
 }
 
 /// How the map of decimated meshes becomes one of the full meshes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Upscaling {
     /// The robust l2,1 problem of the paper.
@@ -86,7 +86,7 @@ pub struct MatchOptions {
     pub backend: Backend,
     /// Number of eigenfunctions of the functional map. Default: the model's; 120 for SHOT.
     pub k: Option<usize>,
-    /// Solver of the functional map. Default: the model's; least squares for SHOT.
+    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT.
     pub solver: Option<FmapSolver>,
     /// SHOT radius relative to sqrt(area). Default: the model's; that of [`ShotOptions`] for SHOT.
     pub shot_radius: Option<f64>,
@@ -168,7 +168,7 @@ impl Matcher {
             Refinement::None | Refinement::Icp => k,
             Refinement::Zoomout | Refinement::Pmf => k.max(REFINED_K),
         };
-        let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver);
+        let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver.for_matching());
         Ok(Self {
             shape_options,
             k,
@@ -255,8 +255,9 @@ impl Matcher {
             basis_target.k().max(self.shape_options.k),
         );
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
-        let raw =
-            timed(observer, &pair, "point map", || recover(&functional_map, &basis_source, &basis_target))?;
+        let raw = timed(observer, &pair, "point map", || {
+            recover_by(Comparison::suiting(self.solver), &functional_map, &basis_source, &basis_target)
+        })?;
         let map = self.refine(source, target, &functional_map, raw, &pair, observer)?;
         drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;

@@ -287,7 +287,7 @@ impl TrainConfig {
         StepOptions { functional_map, loss, clip, ..StepOptions::default() }
     }
 
-    /// The solver that the runtime uses with the trained descriptors.
+    /// The solver in the runtime's terms.
     pub fn runtime_solver(&self) -> FmapSolver {
         match self.solver {
             SolverKind::LeastSquares => FmapSolver::LeastSquares,

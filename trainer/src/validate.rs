@@ -7,7 +7,7 @@ use candle_core::{Device, Tensor};
 use fmnet::Matrix;
 use fmnet::fmap::{FmapSolver, functional_map};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::point_map::recover;
+use fmnet::point_map::{Comparison, recover_by};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 
@@ -80,7 +80,7 @@ impl<'a> Validation<'a> {
         let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
         let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
         let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
-        let map = recover(&map, &basis_source, &basis_target)?;
+        let map = recover_by(Comparison::suiting(solver), &map, &basis_source, &basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))
             .filter(|&(&a, &b)| a != MISSING && b != MISSING)
             .map(|(&a, &b)| (a, b))

@@ -10,6 +10,7 @@ mod dense;
 mod least_squares;
 mod regularized;
 mod soft;
+mod two_way;
 
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
@@ -20,6 +21,7 @@ pub use adjoint::functional_map_of;
 pub use least_squares::{LeastSquaresOptions, least_squares};
 pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
 pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
+pub use two_way::two_way;
 
 pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
 
@@ -36,11 +38,52 @@ pub enum FmapSolver {
         /// connectivities.
         weight: f64,
     },
+    /// The mean of the regularised solves of both directions, [`two_way`].
+    TwoWay {
+        /// Weight of the mask in each solve, default [`FmapSolver::TWO_WAY_WEIGHT`].
+        weight: f64,
+    },
 }
 
 impl FmapSolver {
     /// The weight of the mask that models are trained with.
     pub const DEFAULT_MASK_WEIGHT: f64 = 0.1;
+    /// The weight of the mask where both directions are solved.
+    pub const TWO_WAY_WEIGHT: f64 = 0.03;
+
+    /// What to match with, given what the network was trained with: both directions where it was the regularised solve. The
+    /// paper's least squares stay what they are.
+    pub fn for_matching(self) -> Self {
+        match self {
+            Self::Regularized { .. } => Self::TwoWay { weight: Self::TWO_WAY_WEIGHT },
+            other => other,
+        }
+    }
+}
+
+/// The kinds of [`FmapSolver`], without their settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum SolverKind {
+    /// The paper's: all coefficients by least squares.
+    LeastSquares,
+    /// With the resolvent mask, from the source to the target.
+    Regularized,
+    /// With the resolvent mask, both directions.
+    TwoWay,
+}
+
+impl FmapSolver {
+    /// The solver of a kind with a weight of the mask, by default that of the kind; of a weight alone, both directions; of
+    /// neither, `None`.
+    pub fn chosen(kind: Option<SolverKind>, mask_weight: Option<f64>) -> Option<Self> {
+        let weight = |default| mask_weight.unwrap_or(default);
+        let kind = kind.or(mask_weight.map(|_| SolverKind::TwoWay))?;
+        Some(match kind {
+            SolverKind::LeastSquares => Self::LeastSquares,
+            SolverKind::Regularized => Self::Regularized { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
+            SolverKind::TwoWay => Self::TwoWay { weight: weight(Self::TWO_WAY_WEIGHT) },
+        })
+    }
 }
 
 /// What a solve found.
@@ -151,10 +194,11 @@ pub fn functional_map(
     check_length("a column of the target's coefficients", g_hat.rows(), basis_target.k())?;
     match solver {
         FmapSolver::LeastSquares => least_squares(f_hat, g_hat, &LeastSquaresOptions::default()),
-        FmapSolver::Regularized { weight } => {
+        FmapSolver::Regularized { weight } | FmapSolver::TwoWay { weight } => {
+            let by = if matches!(solver, FmapSolver::TwoWay { .. }) { two_way } else { regularized };
             let eigenvalues_source = scale_free_eigenvalues(basis_source);
             let eigenvalues_target = scale_free_eigenvalues(basis_target);
-            regularized(f_hat, g_hat, &eigenvalues_source, &eigenvalues_target, weight)
+            by(f_hat, g_hat, &eigenvalues_source, &eigenvalues_target, weight)
         }
     }
 }

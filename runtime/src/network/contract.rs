@@ -40,7 +40,7 @@ pub struct ModelMetadata {
     pub shot: ShotOptions,
     /// Number of eigenfunctions of the functional map.
     pub k: usize,
-    /// Solver of the functional map.
+    /// Solver of the functional map that it was trained with.
     pub solver: FmapSolver,
     /// Meshes of more vertices are decimated to so many; `None`: never.
     pub decimate: Option<usize>,
@@ -69,6 +69,7 @@ impl ModelMetadata {
         let (solver, mask_weight) = match self.solver {
             FmapSolver::LeastSquares => ("least-squares", 0.0),
             FmapSolver::Regularized { weight } => ("regularized", weight),
+            FmapSolver::TwoWay { weight } => ("two-way", weight),
         };
         let pairs = [
             ("format_version", self.format_version.to_string()),
@@ -99,6 +100,7 @@ impl ModelMetadata {
         let solver = match pairs.text("solver")? {
             "least-squares" => FmapSolver::LeastSquares,
             "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
+            "two-way" => FmapSolver::TwoWay { weight: pairs.value("mask_weight")? },
             other => return Err(pairs.contract(format!("unknown {PREFIX}solver {other:?}"))),
         };
         let metadata = Self {
@@ -136,7 +138,7 @@ impl ModelMetadata {
         if self.shot.bins.checked_add(1).and_then(|bins| bins.checked_mul(32)) != Some(WIDTH) {
             return wrong("shot_bins", &self.shot.bins, "10");
         }
-        if let FmapSolver::Regularized { weight } = self.solver
+        if let FmapSolver::Regularized { weight } | FmapSolver::TwoWay { weight } = self.solver
             && !(weight.is_finite() && weight >= 0.0)
         {
             return wrong("mask_weight", &weight, "0 or more");

@@ -18,13 +18,13 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// What computes the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
     /// tract, pure Rust, built in.
     #[default]
     Tract,
-    /// onnxruntime, its library loaded at run time.
+    /// onnxruntime, its library, named by ORT_DYLIB_PATH, loaded at run time; needs the feature `ort`.
     Ort,
 }
 

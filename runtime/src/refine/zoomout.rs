@@ -5,7 +5,7 @@ use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares, multiply, solve_positive_definite};
 use crate::point_map::search::nearest_rows;
-use crate::point_map::{PointMap, cosines, transport, transposed};
+use crate::point_map::{Comparison, PointMap, recover_by, transport, transposed};
 use crate::spectral::Eigenbasis;
 
 /// Options of [`zoomout`].
@@ -97,10 +97,7 @@ fn round(
 ) -> Result<(PointMap, Matrix), RefineError> {
     let (basis_source, basis_target) = (basis_source.truncated(k), basis_target.truncated(k));
     let c = functional_map_of(map, &basis_source, &basis_target)?;
-    let pulled_back = transport(&basis_target.eigenvectors, &transposed(&c));
-    let targets = nearest_rows(&basis_source.eigenvectors, &pulled_back)?.index;
-    let confidence = Some(cosines(&basis_source.eigenvectors, &pulled_back, &targets));
-    Ok((PointMap { targets, confidence, n_target: basis_target.n() }, c))
+    Ok((recover_by(Comparison::PulledBack, &c, &basis_source, &basis_target)?, c))
 }
 
 /// For each row `phi(x)` the `y` with the nearest `C^T psi(y)`.

@@ -1,7 +1,7 @@
 //! The command line.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use fmnet::fmap::FmapSolver;
+use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::network::Backend;
 use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
 use std::path::PathBuf;
@@ -59,32 +59,30 @@ pub(crate) struct PipelineArgs {
     /// Model file, or the name of one in ./models [default: the model built into this program]
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) model: Option<String>,
-    /// What computes the network; ort needs the feature `ort` and the library named by ORT_DYLIB_PATH
+    /// What computes the network
     #[arg(long, value_enum, default_value = "tract")]
-    pub(crate) backend: BackendArg,
+    pub(crate) backend: Backend,
     /// Learned descriptors, or SHOT without a network (the paper's baseline)
     #[arg(long, value_enum, default_value = "learned")]
-    pub(crate) descriptor: DescriptorArg,
+    pub(crate) descriptor: DescriptorKind,
     /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Solver of the functional map [default: the model's; least-squares with SHOT]
+    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
     #[arg(long, value_enum)]
-    pub(crate) fm: Option<SolverArg>,
-    /// Weight of the mask of the regularised solver, 0 and up; more suits shapes of unlike connectivity
-    /// [default: the model's, or 0.1]
+    pub(crate) fm: Option<SolverKind>,
+    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
     #[arg(long, value_parser = non_negative)]
     pub(crate) mask_weight: Option<f64>,
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
     #[arg(long, value_name = "N|off", value_parser = decimation)]
     pub(crate) decimate: Option<Decimation>,
-    /// Refinement of the map; pmf is zoomout and then the product manifold filter, which takes longer and makes
-    /// the map one-to-one where both meshes have equally many vertices [default: zoomout; none with SHOT]
+    /// Refinement of the map [default: zoomout; none with SHOT]
     #[arg(long, value_enum)]
-    pub(crate) refine: Option<RefineArg>,
+    pub(crate) refine: Option<Refinement>,
     /// How the map of decimated meshes becomes one of the full meshes
     #[arg(long, value_enum, default_value = "l21")]
-    pub(crate) upscale: UpscaleArg,
+    pub(crate) upscale: Upscaling,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
     #[arg(long, value_parser = radius)]
     pub(crate) shot_radius: Option<f64>,
@@ -207,38 +205,6 @@ pub(crate) struct InspectArgs {
     pub(crate) file: PathBuf,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BackendArg {
-    Tract,
-    Ort,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum DescriptorArg {
-    Learned,
-    Shot,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum SolverArg {
-    LeastSquares,
-    Regularized,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RefineArg {
-    None,
-    Icp,
-    Zoomout,
-    Pmf,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum UpscaleArg {
-    L21,
-    LeastSquares,
-}
-
 /// `--decimate`: a number of vertices, or never.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decimation(pub(crate) Option<usize>);
@@ -272,39 +238,16 @@ impl PipelineArgs {
     /// The library's options.
     pub(crate) fn to_options(&self) -> MatchOptions {
         MatchOptions {
-            descriptor: match self.descriptor {
-                DescriptorArg::Learned => DescriptorKind::Learned,
-                DescriptorArg::Shot => DescriptorKind::Shot,
-            },
+            descriptor: self.descriptor,
             model: self.model.as_deref().map_or(ModelSource::Embedded, |m| ModelSource::File(model_path(m))),
-            backend: match self.backend {
-                BackendArg::Tract => Backend::Tract,
-                BackendArg::Ort => Backend::Ort,
-            },
+            backend: self.backend,
             k: self.k.map(usize::from),
-            solver: self.solver(),
+            solver: FmapSolver::chosen(self.fm, self.mask_weight),
             shot_radius: self.shot_radius,
             decimate: self.decimate.map(|d| d.0),
-            refinement: self.refine.map(|r| match r {
-                RefineArg::None => Refinement::None,
-                RefineArg::Icp => Refinement::Icp,
-                RefineArg::Zoomout => Refinement::Zoomout,
-                RefineArg::Pmf => Refinement::Pmf,
-            }),
-            upscaling: match self.upscale {
-                UpscaleArg::L21 => Upscaling::L21,
-                UpscaleArg::LeastSquares => Upscaling::LeastSquares,
-            },
+            refinement: self.refine,
+            upscaling: self.upscale,
             cache: self.cache.clone(),
-        }
-    }
-
-    fn solver(&self) -> Option<FmapSolver> {
-        let weight = self.mask_weight.unwrap_or(FmapSolver::DEFAULT_MASK_WEIGHT);
-        match (self.fm, self.mask_weight) {
-            (Some(SolverArg::LeastSquares), _) => Some(FmapSolver::LeastSquares),
-            (Some(SolverArg::Regularized), _) | (None, Some(_)) => Some(FmapSolver::Regularized { weight }),
-            (None, None) => None,
         }
     }
 }

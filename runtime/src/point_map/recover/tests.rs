@@ -2,7 +2,7 @@ use super::*;
 use crate::fmap::functional_map_of;
 use crate::fmap::test_basis::{flipped, identity, rectangle, reordered, shuffle, sign};
 
-const BOTH: [Comparison; 2] = [Comparison::Distance, Comparison::PulledBackAngle];
+const BOTH: [Comparison; 2] = [Comparison::Distance, Comparison::PulledBack];
 
 #[test]
 fn identity_map_of_one_shape() {

@@ -1,6 +1,7 @@
 //! The command line.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
+use fmnet::fmap::SolverKind;
 use fmnet::pipeline::Refinement;
 use fmnet_trainer::config::{TrainConfig, TrainOverrides};
 use fmnet_trainer::dataset::Split;
@@ -197,7 +198,7 @@ pub(crate) struct EvaluateArgs {
     pub(crate) maps: Vec<(String, PathBuf)>,
     /// Refinements to compare, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "none,zoomout")]
-    pub(crate) refine: Vec<RefineArg>,
+    pub(crate) refine: Vec<Refinement>,
     /// Splits that pairs are drawn from, separated by commas
     #[arg(long, value_delimiter = ',', default_value = "test")]
     pub(crate) splits: Vec<Split>,
@@ -213,7 +214,10 @@ pub(crate) struct EvaluateArgs {
     /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Weight of the mask of the regularised solver, 0 and up; more suits shapes of unlike connectivity [default: the model's]
+    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
+    #[arg(long, value_enum)]
+    pub(crate) fm: Option<SolverKind>,
+    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
     #[arg(long)]
     pub(crate) mask_weight: Option<f64>,
     /// Curves of others to draw beside: a header `threshold,NAME,...`, then percentages
@@ -247,27 +251,6 @@ pub(crate) struct ReproduceArgs {
     /// Train on the first NVIDIA GPU (needs the feature `cuda`)
     #[arg(long)]
     pub(crate) cuda: bool,
-}
-
-/// Refinement of a map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RefineArg {
-    None,
-    Icp,
-    Zoomout,
-    Pmf,
-}
-
-impl RefineArg {
-    /// The library's option and what labels call it.
-    pub(crate) fn refinement(self) -> (Refinement, &'static str) {
-        match self {
-            Self::None => (Refinement::None, ""),
-            Self::Icp => (Refinement::Icp, " + ICP"),
-            Self::Zoomout => (Refinement::Zoomout, " + ZoomOut"),
-            Self::Pmf => (Refinement::Pmf, " + PMF"),
-        }
-    }
 }
 
 fn named_folder(text: &str) -> Result<(String, PathBuf), String> {

@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use anyhow::{Context, Result, bail};
 use fmnet::eval::{ErrorCurve, curves_from_csv};
 use fmnet::fmap::FmapSolver;
-use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource};
+use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource, Refinement};
 use fmnet_trainer::dataset::Dataset;
 use fmnet_trainer::evaluate::report::{Chapter, write_html};
 use fmnet_trainer::evaluate::{
@@ -64,19 +64,18 @@ fn methods(args: &EvaluateArgs) -> Vec<Method> {
     }
     let mut methods = Vec::new();
     for (name, descriptor, model) in descriptors {
-        for refine in &args.refine {
-            let (refinement, suffix) = refine.refinement();
+        for &refinement in &args.refine {
             let options = MatchOptions {
                 descriptor,
                 model: model.clone(),
                 k: args.k.map(usize::from),
-                solver: args.mask_weight.map(|weight| FmapSolver::Regularized { weight }),
+                solver: FmapSolver::chosen(args.fm, args.mask_weight),
                 refinement: Some(refinement),
                 cache: args.cache.clone(),
                 ..MatchOptions::default()
             };
             let maps = MapSource::Computed(Box::new(options));
-            methods.push(Method { label: format!("{name}{suffix}"), maps });
+            methods.push(Method { label: format!("{name}{}", suffix(refinement)), maps });
         }
     }
     let files = args.maps.iter();
@@ -84,6 +83,16 @@ fn methods(args: &EvaluateArgs) -> Vec<Method> {
         files.map(|(name, folder)| Method { label: name.clone(), maps: MapSource::Files(folder.clone()) }),
     );
     methods
+}
+
+/// What labels call a refinement.
+fn suffix(refinement: Refinement) -> &'static str {
+    match refinement {
+        Refinement::None => "",
+        Refinement::Icp => " + ICP",
+        Refinement::Zoomout => " + ZoomOut",
+        Refinement::Pmf => " + PMF",
+    }
 }
 
 fn read_curves(path: &Path) -> Result<Vec<(String, ErrorCurve)>> {
