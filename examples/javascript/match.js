@@ -103,37 +103,51 @@ function solve(S, b) {
 }
 
 /** Rows of C [k_target, k_source] with C F = G: each row has a system of its own, (F F^T + weight diag(mask_i)) c_i = F g_i. */
-function functionalMap(source, target, metadata) {
+function functionalMap(source, target, maskWeight) {
   const F = source.coefficients, mask = resolventMask(source, target);
   const gram = F.map(a => F.map(b => dot(a, b)));
-  const strength = metadata["fmnet.solver"] === "regularized" ? Number(metadata["fmnet.mask_weight"]) : 0;
-  const weight = strength * gram.reduce((sum, row, i) => sum + row[i], 0) / source.k;
+  const weight = maskWeight * gram.reduce((sum, row, i) => sum + row[i], 0) / source.k;
   return target.coefficients.map((g, i) => {
     const system = gram.map((row, a) => row.map((x, b) => a === b ? x + weight * mask[i][a] : x));
     return solve(system, F.map(f => dot(f, g)));
   });
 }
 
-/** For each row of the source the row of the target whose eigenfunctions are nearest to C phi. */
-function pointMap(C, source, target) {
-  const k = target.k, psi = target.phi;
-  return Array.from({ length: source.n }, (_, x) => {
-    const phi = source.phi.subarray(x * source.k, (x + 1) * source.k), transported = C.map(row => dot(row, phi));
+/** Each row of a [n, k], as rows of k_new, times the matrix whose rows are given. */
+function transported(a, n, k, rows) {
+  return Array.from({ length: n }, (_, i) => Float64Array.from(rows, row => dot(row, a.subarray(i * k, (i + 1) * k))));
+}
+
+/** For each query the nearest row. */
+function nearest(queries, rows) {
+  return queries.map(query => {
     let best = 0, smallest = Infinity;
-    for (let y = 0; y < target.n; y++) {
+    for (let y = 0; y < rows.length; y++) {
       let distance = 0;
-      for (let j = 0; j < k && distance < smallest; j++) distance += (transported[j] - psi[y * k + j]) ** 2;
+      for (let j = 0; j < query.length && distance < smallest; j++) distance += (query[j] - rows[y][j]) ** 2;
       if (distance < smallest) [best, smallest] = [y, distance];
     }
     return best;
   });
 }
 
+/** For each row of the source the row of the target that matches it. */
+function pointMap(source, target, solver) {
+  const rows = shape => Array.from({ length: shape.n }, (_, i) => shape.phi.subarray(i * shape.k, (i + 1) * shape.k));
+  if (solver === "least-squares") {
+    return nearest(transported(source.phi, source.n, source.k, functionalMap(source, target, 0)), rows(target));
+  }
+  // Both directions: the map back, transposed, is another estimate of C.
+  const forth = functionalMap(source, target, 0.03), back = functionalMap(target, source, 0.03);
+  const transpose = back.map((row, i) => row.map((x, j) => (x + forth[j][i]) / 2)); // C^T [k_source, k_target]
+  return nearest(rows(source), transported(target.phi, target.n, target.k, transpose));
+}
+
 async function main() {
   const [folderSource, folderTarget, model, out] = process.argv.slice(2);
   const session = await ort.InferenceSession.create(model);
   const source = await readShape(folderSource, session), target = await readShape(folderTarget, session);
-  const matches = pointMap(functionalMap(source, target, readMetadata(model)), source, target);
+  const matches = pointMap(source, target, readMetadata(model)["fmnet.solver"]);
   fs.writeFileSync(out, matches.map(y => (target.renumbered ? target.renumbered[y] : y) + "\n").join(""));
 }
 

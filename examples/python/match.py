@@ -45,24 +45,32 @@ def resolvent_mask(source, target):
     return np.abs(resolvent(target)[:, None] - resolvent(source)[None, :]) ** 2
 
 
-def functional_map(source, target, metadata):
-    """C [k_target, k_source] with C F = G for the coefficients F of the source and G of the target."""
+def regularized(source, target, mask_weight=0.03):
+    """C [k_target, k_source] with C F = G for the coefficients F of the source and G of the target, nearly diagonal."""
     F, G = source.coefficients(), target.coefficients()
-    if metadata["fmnet.solver"] == "least-squares":
-        return np.linalg.lstsq(F.T, G.T, rcond=None)[0].T
     gram = F @ F.T
-    weight = float(metadata["fmnet.mask_weight"]) * np.trace(gram) / len(gram)
+    weight = mask_weight * np.trace(gram) / len(gram)
     # Each row of C has a system of its own: (F F^T + weight diag(mask_i)) c_i = F g_i.
     systems = gram + weight * resolvent_mask(source, target)[:, :, None] * np.eye(len(gram))
     return np.linalg.solve(systems, (G @ F.T)[:, :, None])[:, :, 0]
 
 
-def point_map(C, source, target):
-    """For each row of the source the row of the target whose eigenfunctions are nearest to C phi."""
-    transported, psi = source.eigenvectors @ C.T, target.eigenvectors
-    squares = (psi**2).sum(axis=1)
-    blocks = np.array_split(transported, len(transported) // 1000 + 1)
-    return np.concatenate([(squares - 2 * block @ psi.T).argmin(axis=1) for block in blocks])
+def nearest(queries, rows):
+    """For each query the nearest row."""
+    squares = (rows**2).sum(axis=1)
+    blocks = np.array_split(queries, len(queries) // 1000 + 1)
+    return np.concatenate([(squares - 2 * block @ rows.T).argmin(axis=1) for block in blocks])
+
+
+def point_map(source, target, solver):
+    """For each row of the source the row of the target that matches it."""
+    phi, psi = source.eigenvectors, target.eigenvectors
+    if solver == "least-squares":
+        C = np.linalg.lstsq(source.coefficients().T, target.coefficients().T, rcond=None)[0].T
+        return nearest(phi @ C.T, psi)
+    # Both directions: the map back, transposed, is another estimate of C.
+    C = (regularized(source, target) + regularized(target, source).T) / 2
+    return nearest(phi, psi @ C)
 
 
 def main():
@@ -70,7 +78,7 @@ def main():
     session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
     metadata = session.get_modelmeta().custom_metadata_map
     source, target = Shape(folder_source, session), Shape(folder_target, session)
-    matches = point_map(functional_map(source, target, metadata), source, target)
+    matches = point_map(source, target, metadata["fmnet.solver"])
     np.savetxt(out, target.vertices[matches], fmt="%d")
 
 

@@ -168,7 +168,8 @@ impl Matcher {
             Refinement::None | Refinement::Icp => k,
             Refinement::Zoomout | Refinement::Pmf => k.max(REFINED_K),
         };
-        let default_solver = network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver.for_matching());
+        let default_solver =
+            network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver.for_matching());
         Ok(Self {
             shape_options,
             k,

@@ -29,6 +29,8 @@ static ALLOCATOR: allocator::Bounded = allocator::Bounded;
 const DEFAULT_SECONDS: f64 = 5.0;
 /// An input that takes longer counts as a hang; the least input takes milliseconds.
 const HANG: Duration = Duration::from_secs(20);
+/// Larger files are not tried at every length.
+const MOST_TRUNCATED: usize = 4000;
 /// Failures of one target after which it is given up.
 const MAX_FAILURES: usize = 5;
 
@@ -55,6 +57,18 @@ fn hostile_files_give_a_result_or_an_error() {
     let seconds = number("FMNET_FUZZ_SECONDS").unwrap_or(DEFAULT_SECONDS) / names.len() as f64;
     let failures: Vec<String> = names.iter().flat_map(|name| fuzz(name, seed, seconds)).collect();
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
+}
+
+/// No length at which a valid file breaks off makes a reader panic.
+#[test]
+fn every_truncated_length() {
+    let folder = fmnet_tests::scratch();
+    for name in targets::NAMES {
+        let target = targets::make(name, &folder.path().join(name));
+        for seed in target.seeds.iter().filter(|seed| seed.len() <= MOST_TRUNCATED) {
+            (0..seed.len()).for_each(|length| drop((target.run)(&seed[..length])));
+        }
+    }
 }
 
 /// Runs a target for so long; what failed.

@@ -141,12 +141,15 @@ fn variants(extension: &str) -> Vec<Vec<u8>> {
         "off" => vec![text(
             "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 0 1 0 1 1 0\n0 1 0 0 0 1 0 0 1 1 0 1\n3 0 1 2\n",
         )],
-        "ply" => vec![text(
-            "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty float x\nproperty double y\n\
+        "ply" => vec![
+            big_endian_ply(),
+            text(
+                "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 3\nproperty float x\nproperty double y\n\
              property short z\nproperty list uchar int l\nelement tristrips 1\nproperty list int int vertex_indices\n\
              element face 1\nproperty list uint8 int32 vertex_index\nproperty list uchar float texcoord\nend_header\n\
              0 0 0 0\n1 2 3 2 4 5\n7 1 0 1 2\n4 0 1 2 -1\n3 0 1 2 6 0 0 1 0 0 1\n",
-        )],
+            ),
+        ],
         "obj" => vec![text(
             "o a\nv 0 0 0\nv 1 0 0 1 0 1\nv 1 1 0\nv 0 1 0\nvt 0 1\nvn 0 0 1\nf -1/-1/1 -2/1 1//1 \\\n2\nusemtl a\nf 1 2 3 4\n",
         )],
@@ -173,6 +176,20 @@ fn variants(extension: &str) -> Vec<Vec<u8>> {
         )],
         _ => Vec::new(),
     }
+}
+
+fn big_endian_ply() -> Vec<u8> {
+    let header = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty double y\nproperty short z\n\
+                  element face 1\nproperty list uint8 int32 vertex_index\nend_header\n";
+    let mut bytes = header.as_bytes().to_vec();
+    for (x, y) in [(0.0f32, 0.0f64), (1.0, 0.0), (0.0, 1.0)] {
+        bytes.extend(x.to_be_bytes());
+        bytes.extend(y.to_be_bytes());
+        bytes.extend(0i16.to_be_bytes());
+    }
+    bytes.push(3);
+    bytes.extend([0i32, 1, 2].iter().flat_map(|v| v.to_be_bytes()));
+    bytes
 }
 
 fn meshes(extension: &str, folder: &Path) -> Target {

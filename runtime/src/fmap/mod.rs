@@ -24,6 +24,7 @@ pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
 pub use two_way::two_way;
 
 pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
+pub(crate) use two_way::mean_with_transpose;
 
 /// How a functional map is computed from descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -27,13 +27,39 @@ fn solve(f: &Matrix, g: &Matrix) -> (Matrix, FmapInfo) {
 fn same_descriptors_give_the_identity() {
     let basis = rectangle(12, 15, 20);
     let f = random(20, 50, 1);
-    for solver in [FmapSolver::LeastSquares, REGULARIZED] {
+    for solver in [FmapSolver::LeastSquares, REGULARIZED, REGULARIZED.for_matching()] {
         let (c, info) = functional_map(&basis, &basis, &f, &f, solver).unwrap();
         assert_close(&c, &identity(20), 1e-12);
         assert_eq!(info.rank, 20);
         assert!(info.condition >= 1.0 && info.condition < 1e4, "{}", info.condition);
         assert!(info.relative_residual < 1e-12);
     }
+}
+
+#[test]
+fn both_ways_is_its_own_transpose_and_nearer_to_the_truth() {
+    let (source, target) = (rectangle(12, 15, 20), rectangle(12, 15, 20));
+    let f = random(20, 60, 1);
+    let noise = random(20, 60, 2);
+    let g = Matrix::from_fn(20, 60, |i, j| sign(i) * (f[(i, j)] + 0.4 * noise[(i, j)]));
+    let truth = Matrix::from_fn(20, 20, |i, j| if i == j { sign(i) } else { 0.0 });
+    let both = FmapSolver::TwoWay { weight: 0.01 };
+    let (c, info) = functional_map(&source, &target, &f, &g, both).unwrap();
+    let (back, _) = functional_map(&target, &source, &g, &f, both).unwrap();
+    assert_close(&back, &transposed(&c), 1e-12);
+    assert!(info.rank == 20 && info.relative_residual > 0.0 && info.relative_residual < 1.0);
+    let one = FmapSolver::Regularized { weight: 0.01 };
+    let (forth, _) = functional_map(&source, &target, &f, &g, one).unwrap();
+    let away = |c: &Matrix| c.data().iter().zip(truth.data()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    assert!(away(&c) < 0.9 * away(&forth), "{} against {}", away(&c), away(&forth));
+}
+
+#[test]
+fn a_weight_alone_means_both_ways() {
+    assert_eq!(FmapSolver::chosen(None, None), None);
+    assert_eq!(FmapSolver::chosen(None, Some(0.2)), Some(FmapSolver::TwoWay { weight: 0.2 }));
+    assert_eq!(FmapSolver::chosen(Some(SolverKind::Regularized), None), Some(REGULARIZED));
+    assert_eq!(FmapSolver::chosen(Some(SolverKind::LeastSquares), Some(1.0)), Some(FmapSolver::LeastSquares));
 }
 
 #[test]

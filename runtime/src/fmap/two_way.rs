@@ -22,11 +22,16 @@ pub fn two_way(
 ) -> Result<(Matrix, FmapInfo), FmapError> {
     let (forth, info) = regularized(f_hat, g_hat, eigenvalues_source, eigenvalues_target, weight)?;
     let (back, info_back) = regularized(g_hat, f_hat, eigenvalues_target, eigenvalues_source, weight)?;
-    let mean = Matrix::from_fn(forth.rows(), forth.cols(), |i, j| 0.5 * (forth[(i, j)] + back[(j, i)]));
+    let mean = mean_with_transpose(&forth, &back);
     let info = FmapInfo {
         rank: info.rank.min(info_back.rank),
         condition: info.condition.max(info_back.condition),
         relative_residual: relative_residual(&mean, f_hat, g_hat),
     };
     Ok((mean, info))
+}
+
+/// `(forth + back^T) / 2`.
+pub(crate) fn mean_with_transpose(forth: &Matrix, back: &Matrix) -> Matrix {
+    Matrix::from_fn(forth.rows(), forth.cols(), |i, j| 0.5 * (forth[(i, j)] + back[(j, i)]))
 }

@@ -34,9 +34,6 @@ mod point_map;
 mod stl;
 mod text;
 
-#[cfg(test)]
-mod hostile;
-
 use std::path::Path;
 
 pub use atomic::{remove_temporary_files, write_atomically};

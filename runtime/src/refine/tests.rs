@@ -22,7 +22,7 @@ fn coarse_map(basis: &Eigenbasis, k: usize) -> PointMap {
 }
 
 fn zoomout_options(samples: ZoomOutSamples) -> ZoomOutOptions {
-    ZoomOutOptions { k_start: 6, k_step: 4, k_max: 60, samples }
+    ZoomOutOptions { k_start: 6, k_step: 4, k_max: 60, samples, both_ways: true }
 }
 
 #[test]
@@ -51,7 +51,11 @@ fn zoomout_improves_a_small_correct_map() {
     let basis = rectangle(30, 40, 60);
     let coarse = coarse_map(&basis, 8);
     assert!(share_exact(&coarse) < 0.5, "{}", share_exact(&coarse));
-    let refined = zoomout(&coarse, &basis, &basis, &zoomout_options(ZoomOutSamples::All)).unwrap();
+    let options = zoomout_options(ZoomOutSamples::All);
+    let one_way =
+        zoomout(&coarse, &basis, &basis, &ZoomOutOptions { both_ways: false, ..options.clone() }).unwrap();
+    assert!(share_exact(&one_way.map) > 0.95, "{}", share_exact(&one_way.map));
+    let refined = zoomout(&coarse, &basis, &basis, &options).unwrap();
     assert!(share_exact(&refined.map) > 0.95, "{}", share_exact(&refined.map));
     assert_eq!(refined.info.rounds.first(), Some(&6));
     assert_eq!(refined.info.rounds.last(), Some(&60));
@@ -140,7 +144,7 @@ fn options_out_of_range_are_errors() {
 fn thread_count_does_not_matter() {
     let basis = rectangle(70, 75, 40);
     let start = coarse_map(&basis, 12);
-    let options = ZoomOutOptions { k_start: 12, k_step: 14, k_max: 40, samples: ZoomOutSamples::All };
+    let options = ZoomOutOptions { k_start: 12, k_step: 14, k_max: 40, ..ZoomOutOptions::default() };
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {

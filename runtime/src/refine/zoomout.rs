@@ -3,7 +3,10 @@
 use super::sampling::farthest_points;
 use super::{RefineError, Refined};
 use crate::Matrix;
-use crate::fmap::{LeastSquaresOptions, functional_map_of, least_squares, multiply, solve_positive_definite};
+use crate::fmap::{
+    LeastSquaresOptions, functional_map_of, least_squares, mean_with_transpose, multiply,
+    solve_positive_definite,
+};
 use crate::point_map::search::nearest_rows;
 use crate::point_map::{Comparison, PointMap, recover_by, transport, transposed};
 use crate::spectral::Eigenbasis;
@@ -11,20 +14,23 @@ use crate::spectral::Eigenbasis;
 /// Options of [`zoomout`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZoomOutOptions {
-    /// Eigenfunctions in the first round. Range 1 and up, default 30; what the initial map gets right.
+    /// Eigenfunctions in the first round. Range 1 and up, default 60; what the initial map gets right.
     pub k_start: usize,
-    /// Eigenfunctions added from round to round. Range 1 and up, default 10; smaller is slower and a little
+    /// Eigenfunctions added from round to round. Range 1 and up, default 20; smaller is slower and a little
     /// better.
     pub k_step: usize,
     /// Eigenfunctions in the last round. Range `k_start` and up, default 200; fewer where a basis has fewer.
     pub k_max: usize,
     /// Which vertices take part before the last round. Default [`ZoomOutSamples::All`].
     pub samples: ZoomOutSamples,
+    /// Whether each round takes the mean of the functional maps of the point maps in both directions, default true. With
+    /// false it is the paper's method, at half the cost.
+    pub both_ways: bool,
 }
 
 impl Default for ZoomOutOptions {
     fn default() -> Self {
-        Self { k_start: 30, k_step: 10, k_max: 200, samples: ZoomOutSamples::All }
+        Self { k_start: 60, k_step: 20, k_max: 200, samples: ZoomOutSamples::All, both_ways: true }
     }
 }
 
@@ -57,6 +63,10 @@ pub struct ZoomOutInfo {
 /// on a pair of FAUST shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short rows of
 /// `Psi`. Source vertices without a match in `map` have one afterwards. The confidence of a match is the cosine
 /// of the angle between `phi(x)` and `C^T psi(y)` in the last round.
+///
+/// With [`ZoomOutOptions::both_ways`] the point map from the target to the source is kept as well, and `C` is the
+/// mean of the one above and of the transpose of its counterpart, as between isometric shapes they are one: on
+/// ten pairs of remeshed FAUST shapes a mean error of 1.73 instead of 1.93.
 pub fn zoomout(
     map: &PointMap,
     basis_source: &Eigenbasis,
@@ -74,30 +84,41 @@ pub fn zoomout(
         let count = count.max(3 * last);
         let source = farthest_points(basis_source, count);
         let target = farthest_points(basis_target, count);
-        if let Some(map) = on_samples(basis_source, basis_target, map, &rounds, &source, &target)? {
-            let (map, functional_map) = round(last, basis_source, basis_target, &map)?;
+        let both_ways = options.both_ways;
+        if let Some(map) =
+            on_samples(basis_source, basis_target, map, &rounds, [&source, &target], both_ways)?
+        {
+            let (basis_source, basis_target) = (basis_source.truncated(last), basis_target.truncated(last));
+            let functional_map = functional_map_of(&map, &basis_source, &basis_target)?;
+            let map = recover_by(Comparison::PulledBack, &functional_map, &basis_source, &basis_target)?;
             let info = ZoomOutInfo { rounds, samples: [source.len(), target.len()] };
             return Ok(Refined { map, functional_map, info });
         }
     }
-    let (mut map, mut functional_map) = (map.clone(), Matrix::default());
+    let (mut map, mut back, mut functional_map) = (map.clone(), None, Matrix::default());
     for &k in &rounds {
-        (map, functional_map) = round(k, basis_source, basis_target, &map)?;
+        let (source, target) = (basis_source.truncated(k), basis_target.truncated(k));
+        functional_map = map_of_both(&map, back.as_ref(), &source, &target)?;
+        map = recover_by(Comparison::PulledBack, &functional_map, &source, &target)?;
+        if options.both_ways && k < last {
+            let transpose = transposed(&functional_map);
+            back = Some(recover_by(Comparison::PulledBack, &transpose, &target, &source)?);
+        }
     }
     let info = ZoomOutInfo { rounds, samples: [basis_source.n(), basis_target.n()] };
     Ok(Refined { map, functional_map, info })
 }
 
-/// One round on all vertices.
-fn round(
-    k: usize,
-    basis_source: &Eigenbasis,
-    basis_target: &Eigenbasis,
+/// The functional map of a point map, `[k, k]`, averaged with that of the point map back, where there is one.
+fn map_of_both(
     map: &PointMap,
-) -> Result<(PointMap, Matrix), RefineError> {
-    let (basis_source, basis_target) = (basis_source.truncated(k), basis_target.truncated(k));
-    let c = functional_map_of(map, &basis_source, &basis_target)?;
-    Ok((recover_by(Comparison::PulledBack, &c, &basis_source, &basis_target)?, c))
+    back: Option<&PointMap>,
+    source: &Eigenbasis,
+    target: &Eigenbasis,
+) -> Result<Matrix, RefineError> {
+    let forth = functional_map_of(map, source, target)?;
+    let Some(back) = back else { return Ok(forth) };
+    Ok(mean_with_transpose(&forth, &functional_map_of(back, target, source)?))
 }
 
 /// For each row `phi(x)` the `y` with the nearest `C^T psi(y)`.
@@ -116,8 +137,8 @@ fn on_samples(
     basis_target: &Eigenbasis,
     map: &PointMap,
     rounds: &[usize],
-    source: &[u32],
-    target: &[u32],
+    [source, target]: [&[u32]; 2],
+    both_ways: bool,
 ) -> Result<Option<PointMap>, RefineError> {
     let matched: Vec<u32> = source.iter().copied().filter(|&x| map.get(x as usize).is_some()).collect();
     if matched.len() < 2 * rounds[0] {
@@ -128,12 +149,19 @@ fn on_samples(
         (basis_source.eigenvectors.select_rows(source), basis_target.eigenvectors.select_rows(target));
     let mut phi_matched = basis_source.eigenvectors.select_rows(&matched);
     let mut psi_matched = basis_target.eigenvectors.select_rows(&images);
-    let mut c = Matrix::default();
+    let (mut phi_back, mut c) = (None::<Matrix>, Matrix::default());
     for &k in rounds {
+        let (phi_k, psi_k) = (phi.first_cols(k), psi.first_cols(k));
         c = least_squares_map(&phi_matched.first_cols(k), &psi_matched.first_cols(k))?;
-        let nearest = pulled_back_nearest(&phi.first_cols(k), &psi.first_cols(k), &c)?;
-        psi_matched = psi.select_rows(&nearest);
+        if let Some(phi_back) = phi_back {
+            c = mean_with_transpose(&c, &least_squares_map(&psi_k, &phi_back.first_cols(k))?);
+        }
+        psi_matched = psi.select_rows(&pulled_back_nearest(&phi_k, &psi_k, &c)?);
         phi_matched.clone_from(&phi);
+        phi_back = match both_ways {
+            true => Some(phi.select_rows(&pulled_back_nearest(&psi_k, &phi_k, &transposed(&c))?)),
+            false => None,
+        };
     }
     let k = c.rows();
     let (phi, psi) = (basis_source.eigenvectors.first_cols(k), basis_target.eigenvectors.first_cols(k));

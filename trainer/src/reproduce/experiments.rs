@@ -35,8 +35,6 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
         ..base(settings, name, &[&registrations], FAUST_STEPS)
     };
     let (regularized, plain, siamese) = ("faust-regularized", "faust-least-squares", "faust-siamese");
-    let trained =
-        |label, training, refinement| TestMethod { label, training: Some(training), k: 120, refinement };
     Experiment {
         name: "faust-synthetic",
         text: "FAUST registrations, k = 120, same connectivity everywhere. The paper trains on subjects 0-7 and tests on 8-9; \
@@ -47,22 +45,22 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
             training(plain, config(plain, SolverKind::LeastSquares, LossKind::Soft)),
             training(siamese, config(siamese, SolverKind::LeastSquares, LossKind::Siamese)),
         ],
-        tests: vec![Test {
+        test: Test {
             title: "FAUST registrations",
             dataset: registrations,
             splits: vec![Split::Validation],
             list: Some(settings.data.join("faust_validation_pairs.txt")),
             methods: vec![
-                trained("regularised", regularized, Refinement::None),
-                trained("regularised + ZoomOut", regularized, Refinement::Zoomout),
-                trained("regularised + PMF", regularized, Refinement::Pmf),
-                trained("FMNet", plain, Refinement::None),
-                trained("FMNet + PMF", plain, Refinement::Pmf),
-                trained("Siamese", siamese, Refinement::None),
-                TestMethod { label: "SHOT", training: None, k: 120, refinement: Refinement::None },
+                learned("regularised", regularized, 120, Refinement::None),
+                learned("regularised + ZoomOut", regularized, 120, Refinement::Zoomout),
+                learned("regularised + PMF", regularized, 120, Refinement::Pmf),
+                learned("FMNet", plain, 120, Refinement::None),
+                learned("FMNet + PMF", plain, 120, Refinement::Pmf),
+                learned("Siamese", siamese, 120, Refinement::None),
+                shot(120),
             ],
             with_references: true,
-        }],
+        },
         gallery: None,
     }
 }
@@ -70,25 +68,20 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
 fn faust_remeshed(settings: &Settings) -> Experiment {
     let remeshed = settings.data.join("faust/remeshed_5k");
     let name = "faust-remeshed";
-    let trained = |label, refinement| TestMethod { label, training: Some(name), k: 120, refinement };
     Experiment {
         name,
         text: "FAUST remeshed to 5000 vertices, each shape on its own: no shared connectivity. Subjects 0-5 train, 6-7 test. A \
                perfect vertex map scores 0.42.",
         preparation: None,
         trainings: vec![training(name, base(settings, name, &[&remeshed], FAUST_STEPS))],
-        tests: vec![Test {
+        test: Test {
             title: "FAUST remeshed",
             dataset: remeshed,
             splits: vec![Split::Validation],
             list: Some(settings.data.join("faust_validation_pairs.txt")),
-            methods: vec![
-                trained("FMNet", Refinement::None),
-                trained("FMNet + ZoomOut", Refinement::Zoomout),
-                TestMethod { label: "SHOT", training: None, k: 120, refinement: Refinement::None },
-            ],
+            methods: raw_zoomout_and_shot(name, 120),
             with_references: false,
-        }],
+        },
         gallery: None,
     }
 }
@@ -96,7 +89,12 @@ fn faust_remeshed(settings: &Settings) -> Experiment {
 fn faust_scans(settings: &Settings) -> Experiment {
     let scans = settings.out.join("data/scans");
     let name = "faust-scans";
-    let trained = |label, refinement| TestMethod { label, training: Some(name), k: 70, refinement };
+    let config = TrainConfig {
+        k: 70,
+        sampling: Sampling::Area,
+        jitter: 10,
+        ..base(settings, name, &[&scans], SCAN_STEPS)
+    };
     Experiment {
         name,
         text: "Scans, k = 70, points drawn by area and moved to one of the 10 nearest scan vertices. The training scans of the \
@@ -107,26 +105,15 @@ fn faust_scans(settings: &Settings) -> Experiment {
             from: settings.data.join("faust/registrations"),
             to: scans.clone(),
         }),
-        trainings: vec![training(
-            name,
-            TrainConfig {
-                k: 70,
-                sampling: Sampling::Area,
-                jitter: 10,
-                ..base(settings, name, &[&scans], SCAN_STEPS)
-            },
-        )],
-        tests: vec![Test {
+        trainings: vec![training(name, config)],
+        test: Test {
             title: "Simulated scans",
             dataset: scans,
             splits: vec![Split::Validation],
             list: None,
-            methods: vec![
-                trained("FMNet", Refinement::None),
-                trained("FMNet + ZoomOut", Refinement::Zoomout),
-            ],
+            methods: raw_zoomout_and_shot(name, 70),
             with_references: false,
-        }],
+        },
         gallery: Some(settings.data.join("faust/scans_7k")),
     }
 }
@@ -134,24 +121,19 @@ fn faust_scans(settings: &Settings) -> Experiment {
 fn scape_transfer(settings: &Settings) -> Experiment {
     let faust = [settings.data.join("faust/registrations"), settings.data.join("faust/remeshed_5k")];
     let name = "faust";
-    let trained = |label, refinement| TestMethod { label, training: Some(name), k: 120, refinement };
     Experiment {
         name: "scape-transfer",
         text: "A network trained on FAUST, registrations and remeshed shapes, matches SCAPE, which it never saw.",
         preparation: None,
         trainings: vec![training(name, base(settings, name, &[&faust[0], &faust[1]], FAUST_STEPS))],
-        tests: vec![Test {
+        test: Test {
             title: "SCAPE",
             dataset: settings.data.join("scape"),
             splits: vec![Split::Train, Split::Validation, Split::Test],
             list: None,
-            methods: vec![
-                trained("trained on FAUST", Refinement::None),
-                trained("trained on FAUST + ZoomOut", Refinement::Zoomout),
-                TestMethod { label: "SHOT", training: None, k: 120, refinement: Refinement::None },
-            ],
+            methods: raw_zoomout_and_shot(name, 120),
             with_references: false,
-        }],
+        },
         gallery: None,
     }
 }
@@ -159,31 +141,42 @@ fn scape_transfer(settings: &Settings) -> Experiment {
 fn partial_dog(settings: &Settings) -> Experiment {
     let parts = settings.out.join("data/dog-parts");
     let name = "dog-parts";
-    let trained = |label, refinement| TestMethod { label, training: Some(name), k: 100, refinement };
+    let config = TrainConfig { k: 100, ..base(settings, name, &[&parts], PARTIAL_STEPS) };
     Experiment {
         name: "partial-dog",
         text: "Parts of the TOSCA dog in other poses, with holes or cut off, matched to the whole dog; k = 100, 1000 minibatches, \
                10 training parts, as the paper does on SHREC'16. The official parts are not public; these are cut in the same \
                way, test parts from other poses and with other holes than training parts.",
         preparation: Some(Preparation::Parts { from: settings.data.join("tosca/dog"), to: parts.clone() }),
-        trainings: vec![training(
-            name,
-            TrainConfig { k: 100, ..base(settings, name, &[&parts], PARTIAL_STEPS) },
-        )],
-        tests: vec![Test {
+        trainings: vec![training(name, config)],
+        test: Test {
             title: "Parts of the dog",
             dataset: parts,
             splits: vec![Split::Test],
             list: None,
-            methods: vec![
-                trained("FMNet", Refinement::None),
-                trained("FMNet + ZoomOut", Refinement::Zoomout),
-                TestMethod { label: "SHOT", training: None, k: 100, refinement: Refinement::None },
-            ],
+            methods: raw_zoomout_and_shot(name, 100),
             with_references: false,
-        }],
+        },
         gallery: None,
     }
+}
+
+/// The network of a training.
+fn learned(label: &'static str, training: &'static str, k: usize, refinement: Refinement) -> TestMethod {
+    TestMethod { label, training: Some(training), k, refinement }
+}
+
+/// The paper's baseline.
+fn shot(k: usize) -> TestMethod {
+    TestMethod { label: "SHOT", training: None, k, refinement: Refinement::None }
+}
+
+fn raw_zoomout_and_shot(training: &'static str, k: usize) -> Vec<TestMethod> {
+    vec![
+        learned("FMNet", training, k, Refinement::None),
+        learned("FMNet + ZoomOut", training, k, Refinement::Zoomout),
+        shot(k),
+    ]
 }
 
 fn training(name: &'static str, config: TrainConfig) -> Training {
@@ -228,7 +221,7 @@ mod tests {
                 assert_eq!(training.config.steps, 7);
             }
             let trained: Vec<&str> = experiment.trainings.iter().map(|t| t.name).collect();
-            let tested = experiment.tests.iter().flat_map(|t| &t.methods).filter_map(|m| m.training);
+            let tested = experiment.test.methods.iter().filter_map(|m| m.training);
             assert!(
                 tested.clone().count() > 0 && tested.clone().all(|name| trained.contains(&name)),
                 "{name}"

@@ -56,7 +56,7 @@ pub struct Experiment {
     /// Networks that are trained.
     pub trainings: Vec<Training>,
     /// What is tested.
-    pub tests: Vec<Test>,
+    pub test: Test,
     /// Folder of meshes without ground truth that are matched with the first training and pictured.
     pub gallery: Option<PathBuf>,
 }
@@ -192,28 +192,18 @@ pub fn run(
         }
         export_training(training)?;
     }
-    let references = references(settings)?;
+    let references = if experiment.test.with_references { references(settings)? } else { Vec::new() };
     let folder = settings.out.join(experiment.name);
-    let mut tested = Vec::new();
-    for test in &experiment.tests {
-        let dataset = Dataset::open(&test.dataset)?;
-        let results = test.run(&dataset, settings, observers.rest)?;
-        tested.push((test, dataset, results));
-    }
-    let chapters: Vec<Chapter> = tested
-        .iter()
-        .map(|(test, dataset, results)| Chapter {
-            title: test.title,
-            text: experiment.text,
-            dataset,
-            results,
-            references: if test.with_references { &references } else { &[] },
-        })
-        .collect();
-    for (chapter, index) in chapters.iter().zip(1..) {
-        chapter.write_files(&folder.join(format!("test-{index}")))?;
-    }
-    let mut sections = chapters.iter().map(Chapter::section).collect::<Result<Vec<_>, _>>()?;
+    let dataset = Dataset::open(&experiment.test.dataset)?;
+    let chapter = Chapter {
+        title: experiment.test.title,
+        text: experiment.text,
+        dataset: &dataset,
+        results: &experiment.test.run(&dataset, settings, observers.rest)?,
+        references: &references,
+    };
+    chapter.write_files(&folder)?;
+    let mut sections = vec![chapter.section()?];
     if let (Some(meshes), Some(training)) = (&experiment.gallery, experiment.trainings.first()) {
         sections.push(gallery::section(meshes, &model_path(&training.config.out), observers.rest)?);
     }
