@@ -66,7 +66,9 @@ fn every_truncated_length() {
     for name in targets::NAMES {
         let target = targets::make(name, &folder.path().join(name));
         for seed in target.seeds.iter().filter(|seed| seed.len() <= MOST_TRUNCATED) {
-            (0..seed.len()).for_each(|length| drop((target.run)(&seed[..length])));
+            for length in 0..seed.len() {
+                (target.run)(&seed[..length]);
+            }
         }
     }
 }

@@ -104,7 +104,7 @@ fn an_experiment_trains_tests_and_reports_and_does_nothing_twice() {
     let json: serde_json::Value = serde_json::from_str(&run()).unwrap();
     let report = PathBuf::from(json["report"].as_str().unwrap());
     let html = std::fs::read_to_string(&report).unwrap();
-    assert!(html.contains("trained on FAUST + ZoomOut") && html.contains("data:image/png;base64,"));
+    assert!(html.contains("FMNet + ZoomOut") && html.contains("data:image/png;base64,"));
     let checkpoint = out.join("trainings/faust/last.safetensors");
     let metrics = || std::fs::read_to_string(out.join("trainings/faust/metrics.jsonl")).unwrap();
     let steps = |text: &str| text.lines().filter(|l| l.contains("\"event\":\"step\"")).count();
