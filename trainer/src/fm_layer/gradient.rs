@@ -7,7 +7,7 @@
 //! fixed.
 
 use super::least_squares::{Factor, factor_guarded, multiply};
-use super::{FmLayerError, FmSolver, regularized};
+use super::{FmLayerError, FmSolver, default_max_condition, regularized};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::evd;
 use faer::{Mat, MatRef, Par};
@@ -47,7 +47,7 @@ impl Solution {
                 let mask: Vec<f64> = mask.iter().map(|value| weight * value).collect();
                 let mean = mean_diagonal(&system);
                 let scaled: Vec<f64> = mask.iter().map(|value| mean * value).collect();
-                (regularized::factor_rows(&system, &scaled, condition)?, mask)
+                (regularized::factor_rows(&system, &scaled, default_max_condition())?, mask)
             }
         };
         let mut rhs = Mat::zeros(k_source, k_target);

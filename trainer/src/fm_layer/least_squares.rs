@@ -32,7 +32,7 @@ impl Factor {
     }
 
     /// The pseudo-inverse of `system` without the eigenvalues below the largest over `max_condition`.
-    fn pseudo_inverse(system: MatRef<'_, f64>, max_condition: f64) -> Option<Self> {
+    pub(super) fn pseudo_inverse(system: MatRef<'_, f64>, max_condition: f64) -> Option<Self> {
         let eigen = system.self_adjoint_eigen(Side::Lower).ok()?;
         let (values, vectors) = (eigen.S().column_vector(), eigen.U());
         let k = system.nrows();
@@ -42,6 +42,13 @@ impl Factor {
         let mut inverse = Mat::zeros(k, k);
         multiply(inverse.as_mut(), scaled.as_ref(), vectors.transpose());
         Some(Self::PseudoInverse(inverse))
+    }
+
+    /// A lower bound of the condition number, from the pivots; 1 for a pseudo-inverse.
+    pub(super) fn condition(&self) -> f64 {
+        let Self::Cholesky(factor) = self else { return 1.0 };
+        let pivots = || (0..factor.nrows()).map(|i| factor[(i, i)]);
+        (pivots().fold(0.0, f64::max) / pivots().fold(f64::INFINITY, f64::min)).powi(2)
     }
 
     /// Replaces every column of `rhs` `[k, m]` by its solution.

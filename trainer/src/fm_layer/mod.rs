@@ -75,17 +75,6 @@ pub enum FmLayerError {
         "the spectral descriptors hold NaN or infinite values; lower the learning rate or check the inputs"
     )]
     NotFinite,
-    /// A regularised system cannot be factored.
-    #[error(
-        "the system of row {row} of the functional map is not positive definite (condition of F F^T: {condition:.1e}); \
-         raise the weight of the regularisation"
-    )]
-    NotPositiveDefinite {
-        /// Row of the functional map, an eigenfunction of the target.
-        row: usize,
-        /// Condition number of `F F^T`.
-        condition: f64,
-    },
     /// The descriptors vanish.
     #[error(
         "the spectral descriptors of the source are all zero, so that no functional map can be solved for"

@@ -6,20 +6,25 @@ use faer::Mat;
 use rayon::prelude::*;
 
 /// Factors the systems of all rows; `mask` is `weight d D` `[k_target, k_source]`, row-major.
+///
+/// The mask leaves entries free whose eigenvalues are equal. Where the descriptors say nothing of them either, as of functions on
+/// stray pieces of a scan that no point was drawn from, the system is singular and its pseudo-inverse is taken.
 pub(super) fn factor_rows(
     system: &Mat<f64>,
     mask: &[f64],
-    condition: f64,
+    max_condition: f64,
 ) -> Result<Vec<Factor>, FmLayerError> {
     let k = system.nrows();
     mask.par_chunks(k)
-        .enumerate()
-        .map(|(row, mask)| {
+        .map(|mask| {
             let mut system = system.clone();
             for (j, &value) in mask.iter().enumerate() {
                 system[(j, j)] += value;
             }
-            Factor::cholesky(system).ok_or(FmLayerError::NotPositiveDefinite { row, condition })
+            let factor = Factor::cholesky(system.clone()).filter(|f| f.condition() <= max_condition);
+            factor
+                .or_else(|| Factor::pseudo_inverse(system.as_ref(), max_condition))
+                .ok_or(FmLayerError::NotFinite)
         })
         .collect()
 }

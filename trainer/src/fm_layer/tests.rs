@@ -131,6 +131,24 @@ fn regularised_solve_copes_with_singular_descriptors() {
     assert!(rows(&solved.map).iter().flatten().all(|value| value.is_finite()));
 }
 
+/// As on scans with stray pieces: a function of eigenvalue 0 that is 0 wherever points were drawn.
+#[test]
+fn regularised_solve_and_gradient_cope_with_functions_that_no_point_sees() {
+    let unseen = rows(&descriptors(1, K_SOURCE)).into_iter().enumerate();
+    let f: Vec<f64> = unseen.flat_map(|(i, row)| if i == 1 { vec![0.0; Q] } else { row }).collect();
+    let f = Tensor::from_vec(f, (K_SOURCE, Q), &Device::Cpu).unwrap();
+    let mask = resolvent_mask(&[0.0, 0.0, 12.0, 24.0, 36.0], &[0.0, 13.0, 27.0, 40.0]);
+    let (solver, g) = (FmSolver::regularized(), descriptors(2, K_TARGET));
+    let f = candle_core::Var::from_tensor(&f).unwrap();
+    let map = functional_map(f.as_tensor(), &g, &solver, &mask).unwrap().map;
+    assert!(rows(&map).iter().all(|row| row[1].abs() < 1e-12 && row[0].abs() < 10.0));
+    // The loss sees the map through the drawn points only, as the soft correspondence does.
+    let seen = map.index_select(&Tensor::new(&[0u32, 2, 3, 4], &Device::Cpu).unwrap(), 1).unwrap();
+    let loss = seen.sqr().unwrap().sum_all().unwrap();
+    let gradient = loss.backward().unwrap().remove(f.as_tensor()).unwrap();
+    assert!(rows(&gradient).iter().flatten().all(|value| value.abs() < 1e3));
+}
+
 #[test]
 fn useless_descriptors_are_an_error_that_says_so() {
     let zeros = descriptors(1, K_SOURCE).zeros_like().unwrap();
