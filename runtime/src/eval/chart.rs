@@ -230,7 +230,9 @@ impl Frame {
 }
 
 fn stroke(index: usize) -> String {
-    let (colour, dashes) = STYLES[index % STYLES.len()];
+    // From the second time round, colours go with other dashes.
+    let round = index / STYLES.len();
+    let (colour, dashes) = (STYLES[index % STYLES.len()].0, STYLES[(index + 3 * round) % STYLES.len()].1);
     let dashes = if dashes.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{dashes}\"") };
     format!("stroke=\"{colour}\" stroke-width=\"2\"{dashes}")
 }
@@ -293,6 +295,12 @@ mod tests {
         }
         assert_eq!(svg.matches("<polyline").count(), 2);
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn no_two_lines_look_alike() {
+        let strokes: std::collections::BTreeSet<String> = (0..3 * STYLES.len()).map(stroke).collect();
+        assert_eq!(strokes.len(), 3 * STYLES.len());
     }
 
     #[test]
