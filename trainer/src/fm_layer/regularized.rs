@@ -17,13 +17,16 @@ pub(super) fn factor_rows(
     let k = system.nrows();
     mask.par_chunks(k)
         .map(|mask| {
-            let mut system = system.clone();
-            for (j, &value) in mask.iter().enumerate() {
-                system[(j, j)] += value;
-            }
-            let factor = Factor::cholesky(system.clone()).filter(|f| f.condition() <= max_condition);
+            let assemble = || {
+                let mut system = system.clone();
+                for (j, &value) in mask.iter().enumerate() {
+                    system[(j, j)] += value;
+                }
+                system
+            };
+            let factor = Factor::cholesky(assemble()).filter(|f| f.condition() <= max_condition);
             factor
-                .or_else(|| Factor::pseudo_inverse(system.as_ref(), max_condition))
+                .or_else(|| Factor::pseudo_inverse(assemble().as_ref(), max_condition))
                 .ok_or(FmLayerError::NotFinite)
         })
         .collect()
