@@ -1,7 +1,8 @@
 //! The back-end on tract: pure Rust, built in.
 //!
 //! tract is fastest when it knows `n`, so the graph is optimised anew for each number of rows and kept while shapes of the same
-//! size follow. It uses one thread; where rows do not depend on each other they are split into blocks of a fixed size.
+//! size follow. Its products and its element-wise operations are spread over the threads of the caller's pool; where rows do not
+//! depend on each other they are split into blocks of a fixed size instead.
 
 use super::Engine;
 use super::contract::{ModelMetadata, WIDTH};
@@ -9,6 +10,7 @@ use crate::Matrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
+use tract_linalg::multithread::{Executor, multithread_tract_scope};
 use tract_onnx::prelude::*;
 
 /// Rows in a block, for models whose rows do not depend on each other.
@@ -65,7 +67,7 @@ impl TractEngine {
 impl Engine for TractEngine {
     fn run(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, String> {
         let values = if self.rows_depend {
-            self.run_rows(shot.data())?
+            multithread_tract_scope(Executor::RayonGlobal, || self.run_rows(shot.data()))?
         } else {
             let blocks: Vec<Vec<f32>> = shot
                 .data()

@@ -14,7 +14,8 @@ const OPSET: i64 = 17;
 /// The version of the file format that came with opset 17.
 const IR_VERSION: i64 = 8;
 
-/// A graph under construction. Every method returns the name of its result, `[n, width]`.
+/// A graph under construction. Inside, features are `[width, n]`, a channel a row: tract (0.23) vectorises what it does to rows
+/// of any length, but not a row of 352 spread over all rows. Every method returns the name of its result.
 pub(super) struct GraphBuilder {
     width: usize,
     activation: Activation,
@@ -29,14 +30,18 @@ impl GraphBuilder {
         builder
     }
 
-    /// `x W + b`
-    pub(super) fn linear(&mut self, name: &str, x: &str, weight: &[f32], bias: &[f32]) -> String {
-        let weight = self.constant(&format!("{name}.weight"), &[self.width, self.width], weight);
-        let bias = self.constant(&format!("{name}.bias"), &[self.width], bias);
-        self.node("Gemm", &format!("{name}.linear"), &[x, &weight, &bias], Vec::new())
+    /// The input, a channel a row.
+    pub(super) fn input(&mut self) -> String {
+        self.node("Transpose", "channels", &[INPUT], vec![integers("perm", &[1, 0])])
     }
 
-    /// `scale (h - mean) / sqrt(variance + epsilon) + shift` with `h = x W` and the statistics taken over its rows.
+    /// `W^T x + b`, with `weight` the `[in, out]` matrix W.
+    pub(super) fn linear(&mut self, name: &str, x: &str, weight: &[f32], bias: &[f32]) -> String {
+        let bias = self.constant(&format!("{name}.bias"), &[self.width, 1], bias);
+        self.product(&format!("{name}.linear"), name, &[x, &bias], weight)
+    }
+
+    /// `scale (h - mean) / sqrt(variance + epsilon) + shift` with `h = W^T x` and the statistics taken over the vertices.
     pub(super) fn normalized_linear(
         &mut self,
         name: &str,
@@ -45,15 +50,14 @@ impl GraphBuilder {
         scale: &[f32],
         shift: &[f32],
     ) -> String {
-        let weight = self.constant(&format!("{name}.weight"), &[self.width, self.width], weight);
-        let scale = self.constant(&format!("{name}.scale"), &[1, self.width], scale);
-        let shift = self.constant(&format!("{name}.shift"), &[1, self.width], shift);
+        let scale = self.constant(&format!("{name}.scale"), &[self.width, 1], scale);
+        let shift = self.constant(&format!("{name}.shift"), &[self.width, 1], shift);
         let step = |part: &str| format!("{name}.{part}");
-        let h = self.node("MatMul", &step("product"), &[x, &weight], Vec::new());
-        let mean = self.row_mean(&step("mean"), &h);
+        let h = self.product(&step("product"), name, &[x], weight);
+        let mean = self.vertex_mean(&step("mean"), &h);
         let centered = self.node("Sub", &step("centered"), &[&h, &mean], Vec::new());
         let square = self.node("Mul", &step("square"), &[&centered, &centered], Vec::new());
-        let variance = self.row_mean(&step("variance"), &square);
+        let variance = self.vertex_mean(&step("variance"), &square);
         let above_zero = self.node("Add", &step("above_zero"), &[&variance, "epsilon"], Vec::new());
         let deviation = self.node("Sqrt", &step("deviation"), &[&above_zero], Vec::new());
         let factor = self.node("Div", &step("factor"), &[&scale, &deviation], Vec::new());
@@ -61,12 +65,11 @@ impl GraphBuilder {
         self.node("Add", &step("normalized"), &[&scaled, &shift], Vec::new())
     }
 
-    /// The activation of `x`, named `name` (with a suffix where that name is taken by `x`).
+    /// The activation of `x`.
     pub(super) fn activation(&mut self, name: &str, x: &str) -> String {
-        let name = if name == x { format!("{name}.activation") } else { name.to_string() };
         match self.activation {
-            Activation::Elu => self.node("Elu", &name, &[x], vec![float("alpha", 1.0)]),
-            Activation::Relu => self.node("Relu", &name, &[x], Vec::new()),
+            Activation::Elu => self.node("Elu", name, &[x], vec![float("alpha", 1.0)]),
+            Activation::Relu => self.node("Relu", name, &[x], Vec::new()),
         }
     }
 
@@ -75,8 +78,9 @@ impl GraphBuilder {
         self.node("Add", name, &[a, b], Vec::new())
     }
 
-    /// The model, its input and output by the contract.
-    pub(super) fn finish(self, metadata: &[(String, String)]) -> ModelProto {
+    /// The model whose output is `x`, by the contract.
+    pub(super) fn finish(mut self, x: &str, metadata: &[(String, String)]) -> ModelProto {
+        self.node("Transpose", OUTPUT, &[x], vec![integers("perm", &[1, 0])]);
         let graph = GraphProto {
             name: "fmnet".into(),
             node: self.nodes,
@@ -100,20 +104,15 @@ impl GraphBuilder {
         }
     }
 
-    fn row_mean(&mut self, name: &str, x: &str) -> String {
-        let axes = AttributeProto {
-            name: "axes".into(),
-            r#type: AttributeType::Ints as i32,
-            ints: vec![0],
-            ..AttributeProto::default()
-        };
-        let keep = AttributeProto {
-            name: "keepdims".into(),
-            r#type: AttributeType::Int as i32,
-            i: 1,
-            ..AttributeProto::default()
-        };
-        self.node("ReduceMean", name, &[x], vec![axes, keep])
+    /// `W^T x`, plus a bias `[width, 1]` where one follows `x` among the inputs.
+    fn product(&mut self, name: &str, layer: &str, inputs: &[&str], weight: &[f32]) -> String {
+        let weight = self.constant(&format!("{layer}.weight"), &[self.width, self.width], weight);
+        let inputs = [&[&weight[..]], inputs].concat();
+        self.node("Gemm", name, &inputs, vec![integer("transA", 1)])
+    }
+
+    fn vertex_mean(&mut self, name: &str, x: &str) -> String {
+        self.node("ReduceMean", name, &[x], vec![integers("axes", &[1]), integer("keepdims", 1)])
     }
 
     fn node(
@@ -151,6 +150,24 @@ fn float(name: &str, value: f32) -> AttributeProto {
         name: name.into(),
         r#type: AttributeType::Float as i32,
         f: value,
+        ..AttributeProto::default()
+    }
+}
+
+fn integer(name: &str, value: i64) -> AttributeProto {
+    AttributeProto {
+        name: name.into(),
+        r#type: AttributeType::Int as i32,
+        i: value,
+        ..AttributeProto::default()
+    }
+}
+
+fn integers(name: &str, values: &[i64]) -> AttributeProto {
+    AttributeProto {
+        name: name.into(),
+        r#type: AttributeType::Ints as i32,
+        ints: values.to_vec(),
         ..AttributeProto::default()
     }
 }

@@ -8,7 +8,7 @@ mod graph;
 use crate::checkpoint::Checkpoint;
 use crate::network::{Network, Normalization};
 use fmnet::io::{IoError, write_atomically};
-use fmnet::network::contract::{FORMAT_VERSION, INPUT, ModelMetadata, OUTPUT, WIDTH};
+use fmnet::network::contract::{FORMAT_VERSION, ModelMetadata, WIDTH};
 use graph::GraphBuilder;
 use prost::Message;
 use std::path::Path;
@@ -85,7 +85,7 @@ pub fn to_onnx(network: &Network, metadata: &ModelMetadata) -> Result<Vec<u8>, E
     }
     let parameters = Parameters { values: network.parameter_values()?, infos: network.parameters() };
     let mut graph = GraphBuilder::new(WIDTH, options.activation, options.epsilon as f32);
-    let mut x = INPUT.to_string();
+    let mut x = graph.input();
     for block in 0..options.blocks {
         let half = |graph: &mut GraphBuilder, input: &str, half: usize| {
             let part = |name: &str| parameters.get(&format!("blocks.{block}.{name}"));
@@ -106,10 +106,9 @@ pub fn to_onnx(network: &Network, metadata: &ModelMetadata) -> Result<Vec<u8>, E
         let inner = graph.activation(&format!("block{block}.1.activation"), &inner);
         let outer = half(&mut graph, &inner, 2);
         let sum = graph.add(&format!("block{block}.sum"), &x, &outer);
-        let last = block + 1 == options.blocks;
-        x = graph.activation(if last { OUTPUT } else { &sum[..] }, &sum);
+        x = graph.activation(&format!("block{block}.activation"), &sum);
     }
-    Ok(graph.finish(&metadata.to_pairs()).encode_to_vec())
+    Ok(graph.finish(&x, &metadata.to_pairs()).encode_to_vec())
 }
 
 struct Parameters {
