@@ -17,7 +17,7 @@ use crate::fmap::{FmapInfo, FmapSolver, functional_map};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
 use crate::point_map::{Comparison, PointMap, recover, recover_by};
-use crate::refine::{IcpOptions, PmfDescriptors, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
+use crate::refine::{IcpOptions, PmfHints, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::upscale::{
@@ -86,7 +86,8 @@ pub struct MatchOptions {
     pub backend: Backend,
     /// Number of eigenfunctions of the functional map. Default: the model's; 120 for SHOT.
     pub k: Option<usize>,
-    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT.
+    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT;
+    /// [`FmapSolver::Part`] for a part and its whole.
     pub solver: Option<FmapSolver>,
     /// SHOT radius relative to sqrt(area). Default: the model's; that of [`ShotOptions`] for SHOT.
     pub shot_radius: Option<f64>,
@@ -136,7 +137,9 @@ pub struct Match {
 pub struct Matcher {
     shape_options: ShapeOptions,
     k: usize,
+    /// Of whole shapes, and of a part and its whole.
     solver: FmapSolver,
+    part_solver: FmapSolver,
     refinement: Refinement,
     upscaling: Upscaling,
     network: Option<DescriptorNetwork>,
@@ -174,6 +177,7 @@ impl Matcher {
             shape_options,
             k,
             solver: options.solver.unwrap_or(default_solver),
+            part_solver: FmapSolver::for_part(options.solver),
             refinement,
             upscaling: options.upscaling,
             network,
@@ -198,10 +202,32 @@ impl Matcher {
 
     /// Processes a shape and computes its descriptors; `name` is for messages.
     pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
+        self.describe_by(&self.options_for(mesh), name, mesh, observer)
+    }
+
+    /// As [`Matcher::describe`], for a part of a shape in the unit of the whole: `whole_area` is the area of that, in squared
+    /// units. A part may be the source of a map to the whole, in whatever pose, and is matched as a part.
+    pub fn describe_part(
+        &self,
+        name: &str,
+        mesh: &Mesh,
+        whole_area: f64,
+        observer: Observer,
+    ) -> Result<DescribedShape, Error> {
+        let options = ShapeOptions { whole_area: Some(whole_area), ..self.options_for(mesh) };
+        self.describe_by(&options, name, mesh, observer)
+    }
+
+    fn describe_by(
+        &self,
+        options: &ShapeOptions,
+        name: &str,
+        mesh: &Mesh,
+        observer: Observer,
+    ) -> Result<DescribedShape, Error> {
         let cache = self.cache.as_ref();
-        let options = self.options_for(mesh);
-        let shape = Shape::process_cached(name, mesh, &options, cache, observer)?;
-        let key = Shape::cache_key(mesh, &options);
+        let shape = Shape::process_cached(name, mesh, options, cache, observer)?;
+        let key = Shape::cache_key(mesh, options);
         let Some(network) = &self.network else {
             let descriptors = shape.shot.clone();
             return Ok(DescribedShape { shape, descriptors, key });
@@ -237,12 +263,12 @@ impl Matcher {
         observer: Observer,
     ) -> Result<Match, Error> {
         let pair = format!("{} -> {}", source.shape.name, target.shape.name);
-        let (basis_source, basis_target) =
-            (source.shape.basis.at_unit_area(self.k), target.shape.basis.at_unit_area(self.k));
+        let (basis_source, basis_target) = (source.shape.unit_basis(self.k), target.shape.unit_basis(self.k));
+        let solver = if source.shape.whole_area.is_some() { self.part_solver } else { self.solver };
         let (functional_map, functional_map_info) = timed(observer, &pair, "functional map", || {
             let (f, g) =
                 (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
-            functional_map(&basis_source, &basis_target, &f, &g, self.solver)
+            functional_map(&basis_source, &basis_target, &f, &g, solver)
         })?;
         if functional_map_info.rank < self.k {
             observer(Event::Warning(format!(
@@ -257,7 +283,7 @@ impl Matcher {
         );
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
         let raw = timed(observer, &pair, "point map", || {
-            recover_by(Comparison::suiting(self.solver), &functional_map, &basis_source, &basis_target)
+            recover_by(Comparison::suiting(solver), &functional_map, &basis_source, &basis_target)
         })?;
         let map = self.refine(source, target, &functional_map, raw, &pair, observer)?;
         drop(reserved);
@@ -275,14 +301,13 @@ impl Matcher {
         pair: &str,
         observer: Observer,
     ) -> Result<PointMap, Error> {
-        let at_k = |described: &DescribedShape| described.shape.basis.at_unit_area(self.k);
-        let whole = |described: &DescribedShape| {
-            let basis = &described.shape.basis;
-            basis.at_unit_area(basis.k())
-        };
+        let at_k = |described: &DescribedShape| described.shape.unit_basis(self.k);
+        let whole = |described: &DescribedShape| described.shape.unit_basis(described.shape.basis.k());
+        let zoomout_options =
+            ZoomOutOptions { part: source.shape.whole_area.is_some(), ..ZoomOutOptions::default() };
         let by_zoomout = || {
             timed(observer, pair, "zoomout", || {
-                zoomout(&raw, &whole(source), &whole(target), &ZoomOutOptions::default())
+                zoomout(&raw, &whole(source), &whole(target), &zoomout_options)
             })
         };
         let map = match self.refinement {
@@ -295,10 +320,13 @@ impl Matcher {
             Refinement::Pmf => {
                 let start = by_zoomout()?.map;
                 // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
-                let descriptors = PmfDescriptors { source: &source.shape.shot, target: &target.shape.shot };
+                let hints = PmfHints {
+                    descriptors: Some([&source.shape.shot, &target.shape.shot]),
+                    meshes: Some([source.shape.mesh(), target.shape.mesh()]),
+                };
                 let (basis_source, basis_target) = (whole(source), whole(target));
                 timed(observer, pair, "pmf", || {
-                    pmf(&start, &basis_source, &basis_target, Some(descriptors), &PmfOptions::default())
+                    pmf(&start, &basis_source, &basis_target, hints, &PmfOptions::default())
                 })?
                 .map
             }

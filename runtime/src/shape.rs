@@ -22,11 +22,14 @@ pub struct ShapeOptions {
     pub k: usize,
     /// Settings of the SHOT descriptor.
     pub shot: ShotOptions,
+    /// For a part of a shape: the area of the whole, in squared units of the mesh, above 0. The SHOT radius is then relative
+    /// to it, and so is [`Shape::unit_basis`]. `None`: the shape is whole. Default `None`.
+    pub whole_area: Option<f64>,
 }
 
 impl Default for ShapeOptions {
     fn default() -> Self {
-        Self { decimate: Some(15_000), k: 120, shot: ShotOptions::default() }
+        Self { decimate: Some(15_000), k: 120, shot: ShotOptions::default(), whole_area: None }
     }
 }
 
@@ -49,6 +52,8 @@ pub struct Shape {
     pub basis: Eigenbasis,
     /// SHOT descriptors of the working mesh, `[n, 352]`.
     pub shot: Matrix<f32>,
+    /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]).
+    pub whole_area: Option<f64>,
 }
 
 impl Shape {
@@ -85,8 +90,10 @@ impl Shape {
             eigenbasis(&Laplacian::new(work), options.k, &EigenOptions::default())
         })
         .map_err(|e| in_shape(e.into()))?;
+        let relative_scale = options.whole_area.map_or(1.0, |whole| (whole / work.area()).sqrt());
+        let shot_options = ShotOptions { radius: options.shot.radius * relative_scale, ..options.shot };
         let (shot, info) =
-            timed(observer, name, "shot", || shot(work, &options.shot)).map_err(|e| in_shape(e.into()))?;
+            timed(observer, name, "shot", || shot(work, &shot_options)).map_err(|e| in_shape(e.into()))?;
         drop(reserved);
         if info.zero_rows > work.n_vertices() / 10 {
             observer(Event::Warning(format!(
@@ -104,6 +111,7 @@ impl Shape {
             decimated,
             basis,
             shot,
+            whole_area: options.whole_area,
         })
     }
 
@@ -147,6 +155,11 @@ impl Shape {
         self.mesh().n_vertices()
     }
 
+    /// The first `k` eigenpairs where the area of the shape, or of the whole that it is a part of, counts as 1.
+    pub fn unit_basis(&self, k: usize) -> Eigenbasis {
+        self.basis.in_unit(self.whole_area.unwrap_or_else(|| self.basis.area()), k)
+    }
+
     /// Vertex of `full_mesh` of a vertex of the working mesh.
     pub fn full_of_work(&self, vertex: u32) -> u32 {
         self.decimated.as_ref().map_or(vertex, |(_, injection)| injection[vertex as usize])
@@ -174,7 +187,7 @@ impl Shape {
             out.slice(injection);
         }
         out.slice(&self.basis.eigenvalues).matrix(&self.basis.eigenvectors).slice(&self.basis.mass);
-        out.matrix(&self.shot);
+        out.matrix(&self.shot).value(self.whole_area.unwrap_or(f64::NAN));
         out.finish()
     }
 
@@ -190,8 +203,19 @@ impl Shape {
         let basis =
             Eigenbasis { eigenvalues: input.slice()?, eigenvectors: input.matrix()?, mass: input.slice()? };
         let shot = input.matrix()?;
+        let whole_area = Some(input.value::<f64>()?).filter(|area| area.is_finite());
         let name = name.to_string();
-        Some(Self { name, n_input, full_mesh, input_of_full, full_of_input, decimated, basis, shot })
+        Some(Self {
+            name,
+            n_input,
+            full_mesh,
+            input_of_full,
+            full_of_input,
+            decimated,
+            basis,
+            shot,
+            whole_area,
+        })
     }
 }
 

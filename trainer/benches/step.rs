@@ -40,7 +40,7 @@ fn run(name: &str, points: usize, solver: FmSolver, both_directions: bool, threa
     let mut generator = ChaCha8Rng::seed_from_u64(1);
     let source = shape(points, &mut generator, both_directions);
     let target = shape(points, &mut generator, true);
-    let pairs = [PairBatch { source, target, negatives: Vec::new() }];
+    let pairs = [PairBatch { source, target, source_is_part: false, negatives: Vec::new() }];
     let network =
         Network::new(NetworkOptions::default(), &Device::Cpu).expect("the default network is valid");
     let options = StepOptions { functional_map: solver, ..StepOptions::default() };

@@ -259,6 +259,7 @@ impl TrainConfig {
             decimate: Some(self.decimate).filter(|&n| n > 0),
             k: self.k,
             shot: ShotOptions { radius: self.shot_radius, ..ShotOptions::default() },
+            whole_area: None,
         }
     }
 

@@ -33,8 +33,8 @@ pub struct PrepareOptions {
 pub struct PreparedShape {
     /// Where it comes from.
     pub entry: ShapeEntry,
-    /// Basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area
-    /// ([`Eigenbasis::at_unit_area`](fmnet::spectral::Eigenbasis::at_unit_area)): minibatches and maps need no other.
+    /// Basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area, a part as its whole
+    /// ([`Shape::unit_basis`]): minibatches and maps need no other.
     pub shape: Shape,
     /// Vertex of the working mesh of every point of the group, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
@@ -70,16 +70,16 @@ pub fn prepare(
     observer: Observer,
 ) -> Result<PreparedShape, PrepareError> {
     let mesh = entry.read()?;
-    let mut shape = Shape::process_cached(&entry.name, &mesh, &options.shape, cache, observer)?;
-    shape.basis = shape.basis.at_unit_area(shape.basis.k());
+    let shape_options = ShapeOptions { whole_area: entry.whole_area()?, ..options.shape.clone() };
+    let mut shape = Shape::process_cached(&entry.name, &mesh, &shape_options, cache, observer)?;
+    shape.basis = shape.unit_basis(shape.basis.k());
     let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
     let key = CacheKey::of(&[
-        Shape::cache_key(&mesh, &options.shape).as_bytes(),
+        Shape::cache_key(&mesh, &shape_options).as_bytes(),
         bytemuck::cast_slice(&points),
         &options.pool.to_le_bytes(),
         &options.seed.to_le_bytes(),
         entry.group.as_bytes(),
-        &[u8::from(entry.partial)],
     ]);
     if let Some(pool) =
         cache.and_then(|cache| cache.fetch("pool", key, observer)).and_then(|b| Pool::decode(&b))
@@ -138,7 +138,7 @@ impl Pool {
         let mut chosen: Vec<u32> =
             group_pool(&entry.group, points.len(), options).into_iter().filter(has).collect();
         keep_main_component(shape.mesh(), points, &mut chosen);
-        if entry.partial {
+        if entry.is_part() {
             return Self { points: chosen, distances: Vec::new() };
         }
         let vertices: Vec<u32> = chosen.iter().map(|&p| points[p as usize]).collect();

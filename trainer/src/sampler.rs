@@ -1,7 +1,7 @@
 //! Minibatches: which pair, which points.
 //!
 //! A minibatch is one index set of points of a pair, the same for both shapes, so that row `i` of the source corresponds with
-//! row `i` of the target. Minibatch `b` of a run depends on the seed and on `b` alone, so a resumed run draws what the
+//! row `i` of the target; where the source is a part, the target has further rows. Minibatch `b` of a run depends on the seed and on `b` alone, so a resumed run draws what the
 //! uninterrupted one would have.
 
 use crate::config::{LossKind, Sampling, TrainConfig};
@@ -49,7 +49,7 @@ impl<'a> Sampler<'a> {
         let mut pairs = Vec::new();
         for (source, s) in shapes.iter().enumerate() {
             for (target, t) in shapes.iter().enumerate() {
-                let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.partial;
+                let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.is_part();
                 if corresponds && common_points(s, t).len() >= MIN_COMMON_POINTS.max(config.k) {
                     pairs.push((source, target));
                 }
@@ -77,19 +77,30 @@ impl<'a> Sampler<'a> {
 
     fn pair(&self, rng: &mut ChaCha8Rng) -> PairBatch {
         let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
-        let points = self.draw(&self.shapes[source], &self.shapes[target], rng);
+        let (common, all) = self.draw(&self.shapes[source], &self.shapes[target], rng);
         let negatives =
-            if self.config.loss == LossKind::Siamese { negatives(points.len(), rng) } else { Vec::new() };
+            if self.config.loss == LossKind::Siamese { negatives(common.len(), rng) } else { Vec::new() };
         PairBatch {
-            source: self.sample(source, &points, rng),
-            target: self.sample(target, &points, rng),
+            source: self.sample(source, &common, rng),
+            target: self.sample(target, &all, rng),
+            source_is_part: self.shapes[source].entry.is_part(),
             negatives,
         }
     }
 
-    /// Draws common points of the pools without replacement, ascending.
-    fn draw(&self, source: &PreparedShape, target: &PreparedShape, rng: &mut ChaCha8Rng) -> Vec<u32> {
-        let common = common_points(source, target);
+    /// Draws points of the target's pool without replacement: those that the source has too, ascending, and all, the same ones
+    /// first. Only a part lacks some: its whole is sampled everywhere, or its descriptors would be compared with those of
+    /// a part.
+    fn draw(
+        &self,
+        source: &PreparedShape,
+        target: &PreparedShape,
+        rng: &mut ChaCha8Rng,
+    ) -> (Vec<u32>, Vec<u32>) {
+        let common = match source.entry.is_part() {
+            true => target.pool.points.clone(),
+            false => common_points(source, target),
+        };
         let count = self.config.points.min(common.len());
         let area = |&point: &u32| target.shape.basis.mass[target.points[point as usize] as usize];
         let mut points: Vec<u32> = match self.config.sampling {
@@ -101,7 +112,10 @@ impl<'a> Sampler<'a> {
                 .collect(),
         };
         points.sort_unstable();
-        points
+        let in_source = |point: &u32| source.pool.points.binary_search(point).is_ok();
+        let (common, others): (Vec<u32>, Vec<u32>) = points.into_iter().partition(in_source);
+        let all = [&common[..], &others].concat();
+        (common, all)
     }
 
     fn sample(&self, shape: usize, points: &[u32], rng: &mut ChaCha8Rng) -> ShapeBatch {

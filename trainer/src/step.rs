@@ -1,6 +1,6 @@
 //! One training step: network, projection, functional map, loss, gradient, Adam.
 
-use crate::fm_layer::{FmSolver, functional_map};
+use crate::fm_layer::{FmSolver, FunctionalMap, functional_map};
 use crate::loss::{LossOptions, siamese};
 use crate::network::Network;
 use crate::optimizer::{Adam, AdamOptions};
@@ -28,13 +28,17 @@ pub struct ShapeBatch {
     pub distances: Option<Matrix<f32>>,
 }
 
-/// A pair on `m` sampled points, of which row `i` of the source corresponds to row `i` of the target.
+/// A pair on `m` sampled points, of which row `i` of the source corresponds to row `i` of the target. Where the source is a part
+/// of the target, the target has further points, those that the part lacks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairBatch {
     /// The shape that is mapped.
     pub source: ShapeBatch,
     /// The shape that it is mapped to.
     pub target: ShapeBatch,
+    /// Whether the source is a part of the target: the functional map is then solved for from the whole to the part, and only
+    /// used from the part to the whole (see [`fmnet::fmap::part`]).
+    pub source_is_part: bool,
     /// Pairs (source row, target row) that do not correspond, for the siamese loss.
     pub negatives: Vec<(u32, u32)>,
 }
@@ -196,13 +200,18 @@ impl StepRunner {
         let backward = (&pair.target, &spectral_target, &pair.source, &spectral_source);
         for (source, spectral_source, target, spectral_target) in [forward, backward] {
             let Some(distances) = &target.distances else { continue };
-            let mask = resolvent_mask(&source.eigenvalues, &target.eigenvalues);
-            let solved =
-                functional_map(spectral_source, spectral_target, &self.options.functional_map, &mask)?;
+            let mut solved = match pair.source_is_part {
+                true => self.functional_map((target, spectral_target), (source, spectral_source))?,
+                false => self.functional_map((source, spectral_source), (target, spectral_target))?,
+            };
+            if pair.source_is_part {
+                solved.map = solved.map.t()?;
+            }
+            let matched = source.basis.rows() * target.basis.rows();
             let input = SoftErrorInput {
                 basis_source: source.basis.data().to_vec(),
                 basis_target: target.basis.data().to_vec(),
-                distances: distances.data().to_vec(),
+                distances: distances.data()[..matched].to_vec(),
                 norm,
             };
             let error = soft_error(&solved.map, input)?;
@@ -218,6 +227,17 @@ impl StepRunner {
             });
         }
         total.ok_or_else(|| candle_core::Error::msg("the soft error needs the distances of the target"))
+    }
+}
+
+impl StepRunner {
+    fn functional_map(
+        &self,
+        (from, spectral_from): (&ShapeBatch, &Tensor),
+        (to, spectral_to): (&ShapeBatch, &Tensor),
+    ) -> Result<FunctionalMap, candle_core::Error> {
+        let mask = resolvent_mask(&from.eigenvalues, &to.eigenvalues);
+        functional_map(spectral_from, spectral_to, &self.options.functional_map, &mask)
     }
 }
 
@@ -250,7 +270,8 @@ fn check(pair: &PairBatch, width: usize, loss: &LossOptions) -> Result<(), Strin
             }
         };
         let (rows, k) = (shape.shot.rows(), shape.eigenvalues.len());
-        expect("descriptors", (rows, shape.shot.cols()), (points.max(1), width))?;
+        let expected = if pair.source_is_part { rows.max(points) } else { points };
+        expect("descriptors", (rows, shape.shot.cols()), (expected.max(1), width))?;
         if matches!(loss, LossOptions::SoftError { .. }) {
             expect("eigenfunctions", (shape.basis.rows(), shape.basis.cols()), (rows, k.max(1)))?;
             expect("vertex areas", (shape.mass.len(), 1), (rows, 1))?;

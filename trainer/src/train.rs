@@ -168,9 +168,9 @@ fn validation_entries(config: &TrainConfig) -> Result<Vec<ShapeEntry>, TrainErro
     let all = entries(config)?;
     let mut chosen: Vec<ShapeEntry> =
         all.iter().filter(|entry| entry.split == Split::Validation).cloned().collect();
-    for whole in all.into_iter().filter(|entry| !entry.partial && entry.split != Split::Validation) {
+    for whole in all.into_iter().filter(|entry| !entry.is_part() && entry.split != Split::Validation) {
         let of_group = || chosen.iter().filter(|entry| entry.group == whole.group);
-        if of_group().count() > 0 && of_group().all(|entry| entry.partial) {
+        if of_group().count() > 0 && of_group().all(|entry| entry.is_part()) {
             chosen.push(whole);
         }
     }

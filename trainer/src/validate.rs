@@ -38,7 +38,7 @@ impl<'a> Validation<'a> {
     pub fn new(shapes: &'a [PreparedShape], count: usize, seed: u64) -> Self {
         let all = (0..shapes.len()).flat_map(|s| (0..shapes.len()).map(move |t| (s, t)));
         let fits = |&(s, t): &(usize, usize)| {
-            s != t && shapes[s].entry.group == shapes[t].entry.group && !shapes[t].entry.partial
+            s != t && shapes[s].entry.group == shapes[t].entry.group && !shapes[t].entry.is_part()
         };
         let mut pairs: Vec<(usize, usize)> = all.filter(fits).collect();
         pairs.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
@@ -76,9 +76,10 @@ impl<'a> Validation<'a> {
         solver: FmapSolver,
     ) -> anyhow::Result<Vec<f32>> {
         let (s, t) = (&self.shapes[source], &self.shapes[target]);
-        let (basis_source, basis_target) = (s.shape.basis.at_unit_area(k), t.shape.basis.at_unit_area(k));
+        let (basis_source, basis_target) = (s.shape.basis.truncated(k), t.shape.basis.truncated(k));
         let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
         let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
+        let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
         let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
         let map = recover_by(Comparison::suiting(solver), &map, &basis_source, &basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))

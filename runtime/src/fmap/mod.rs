@@ -8,6 +8,7 @@
 mod adjoint;
 mod dense;
 mod least_squares;
+mod part;
 mod regularized;
 mod soft;
 mod two_way;
@@ -19,6 +20,7 @@ use thiserror::Error;
 
 pub use adjoint::functional_map_of;
 pub use least_squares::{LeastSquaresOptions, least_squares};
+pub use part::part;
 pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
 pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
 pub use two_way::two_way;
@@ -44,6 +46,12 @@ pub enum FmapSolver {
         /// Weight of the mask in each solve, default [`FmapSolver::TWO_WAY_WEIGHT`].
         weight: f64,
     },
+    /// For a source that is a part of the target, with bases in one unit: the transpose of the regularised solve from the
+    /// whole to the part, [`part`].
+    Part {
+        /// Weight of the mask, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
+        weight: f64,
+    },
 }
 
 impl FmapSolver {
@@ -62,6 +70,17 @@ impl FmapSolver {
     }
 }
 
+impl FmapSolver {
+    /// What to match a part with, given what was asked for: of two directions only one holds there.
+    pub fn for_part(chosen: Option<Self>) -> Self {
+        match chosen {
+            None => Self::Part { weight: Self::DEFAULT_MASK_WEIGHT },
+            Some(Self::TwoWay { weight }) => Self::Part { weight },
+            Some(other) => other,
+        }
+    }
+}
+
 /// The kinds of [`FmapSolver`], without their settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum SolverKind {
@@ -71,6 +90,8 @@ pub enum SolverKind {
     Regularized,
     /// With the resolvent mask, both directions.
     TwoWay,
+    /// With the resolvent mask, from the target to the source, which is a part of it.
+    Part,
 }
 
 impl FmapSolver {
@@ -83,6 +104,7 @@ impl FmapSolver {
             SolverKind::LeastSquares => Self::LeastSquares,
             SolverKind::Regularized => Self::Regularized { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
             SolverKind::TwoWay => Self::TwoWay { weight: weight(Self::TWO_WAY_WEIGHT) },
+            SolverKind::Part => Self::Part { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
         })
     }
 }
@@ -200,6 +222,9 @@ pub fn functional_map(
             let eigenvalues_source = scale_free_eigenvalues(basis_source);
             let eigenvalues_target = scale_free_eigenvalues(basis_target);
             by(f_hat, g_hat, &eigenvalues_source, &eigenvalues_target, weight)
+        }
+        FmapSolver::Part { weight } => {
+            part(f_hat, g_hat, &basis_source.eigenvalues, &basis_target.eigenvalues, weight)
         }
     }
 }

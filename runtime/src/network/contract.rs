@@ -61,7 +61,7 @@ pub struct ModelMetadata {
 impl ModelMetadata {
     /// The settings of [`crate::shape::Shape::process`] that fit the model.
     pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot }
+        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot, whole_area: None }
     }
 
     /// As key-value pairs for `metadata_props`.
@@ -70,6 +70,7 @@ impl ModelMetadata {
             FmapSolver::LeastSquares => ("least-squares", 0.0),
             FmapSolver::Regularized { weight } => ("regularized", weight),
             FmapSolver::TwoWay { weight } => ("two-way", weight),
+            FmapSolver::Part { weight } => ("part", weight),
         };
         let pairs = [
             ("format_version", self.format_version.to_string()),
@@ -101,6 +102,7 @@ impl ModelMetadata {
             "least-squares" => FmapSolver::LeastSquares,
             "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
             "two-way" => FmapSolver::TwoWay { weight: pairs.value("mask_weight")? },
+            "part" => FmapSolver::Part { weight: pairs.value("mask_weight")? },
             other => return Err(pairs.contract(format!("unknown {PREFIX}solver {other:?}"))),
         };
         let metadata = Self {
@@ -138,7 +140,9 @@ impl ModelMetadata {
         if self.shot.bins.checked_add(1).and_then(|bins| bins.checked_mul(32)) != Some(WIDTH) {
             return wrong("shot_bins", &self.shot.bins, "10");
         }
-        if let FmapSolver::Regularized { weight } | FmapSolver::TwoWay { weight } = self.solver
+        if let FmapSolver::Regularized { weight }
+        | FmapSolver::TwoWay { weight }
+        | FmapSolver::Part { weight } = self.solver
             && !(weight.is_finite() && weight >= 0.0)
         {
             return wrong("mask_weight", &weight, "0 or more");

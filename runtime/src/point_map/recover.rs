@@ -29,7 +29,9 @@ impl Comparison {
     pub fn suiting(solver: FmapSolver) -> Self {
         match solver {
             FmapSolver::TwoWay { .. } => Self::PulledBack,
-            FmapSolver::LeastSquares | FmapSolver::Regularized { .. } => Self::Distance,
+            FmapSolver::LeastSquares | FmapSolver::Regularized { .. } | FmapSolver::Part { .. } => {
+                Self::Distance
+            }
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::point_map::{PointMap, RecoverError, search::SearchError};
 use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
-pub use pmf::{PmfDescriptors, PmfInfo, PmfOptions, pmf};
+pub use pmf::{PmfHints, PmfInfo, PmfOptions, pmf};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.
@@ -60,6 +60,19 @@ pub enum RefineError {
         /// Vertices of the source.
         n_source: usize,
         /// Vertices of the target.
+        n_target: usize,
+    },
+    /// The meshes are not those of the bases.
+    #[error(
+        "meshes of {} and {} vertices for bases of {n_source} and {n_target} vertices; give the meshes that the bases are of",
+        found[0], found[1]
+    )]
+    Meshes {
+        /// Vertices of the source's mesh and of the target's.
+        found: [usize; 2],
+        /// Vertices of the source's basis.
+        n_source: usize,
+        /// Vertices of the target's basis.
         n_target: usize,
     },
     /// Not one source vertex has a match to start from.

@@ -22,7 +22,7 @@ fn coarse_map(basis: &Eigenbasis, k: usize) -> PointMap {
 }
 
 fn zoomout_options(samples: ZoomOutSamples) -> ZoomOutOptions {
-    ZoomOutOptions { k_start: 6, k_step: 4, k_max: 60, samples, both_ways: true }
+    ZoomOutOptions { k_start: 6, k_step: 4, k_max: 60, samples, ..ZoomOutOptions::default() }
 }
 
 #[test]

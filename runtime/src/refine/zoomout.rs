@@ -21,16 +21,27 @@ pub struct ZoomOutOptions {
     pub k_step: usize,
     /// Eigenfunctions in the last round. Range `k_start` and up, default 200; fewer where a basis has fewer.
     pub k_max: usize,
-    /// Which vertices take part before the last round. Default [`ZoomOutSamples::All`].
+    /// Which vertices take part before the last round. Default [`ZoomOutSamples::All`], to which a part keeps.
     pub samples: ZoomOutSamples,
     /// Whether each round takes the mean of the functional maps of the point maps in both directions, default true. With
     /// false it is the paper's method, at half the cost.
     pub both_ways: bool,
+    /// Whether the source is a part of the target, with bases in one unit
+    /// ([`Eigenbasis::in_unit`]), default false. It then takes as many fewer eigenfunctions as its area is smaller, as its
+    /// eigenvalues are spaced the wider, and only the map to the target is kept, whatever `both_ways` says.
+    pub part: bool,
 }
 
 impl Default for ZoomOutOptions {
     fn default() -> Self {
-        Self { k_start: 60, k_step: 20, k_max: 200, samples: ZoomOutSamples::All, both_ways: true }
+        Self {
+            k_start: 60,
+            k_step: 20,
+            k_max: 200,
+            samples: ZoomOutSamples::All,
+            both_ways: true,
+            part: false,
+        }
     }
 }
 
@@ -80,7 +91,7 @@ pub fn zoomout(
         return Err(RefineError::NothingMatched);
     }
     let last = rounds[rounds.len() - 1];
-    if let ZoomOutSamples::Farthest(count) = options.samples {
+    if let (ZoomOutSamples::Farthest(count), false) = (options.samples, options.part) {
         let count = count.max(3 * last);
         let source = farthest_points(basis_source, count);
         let target = farthest_points(basis_target, count);
@@ -95,12 +106,17 @@ pub fn zoomout(
             return Ok(Refined { map, functional_map, info });
         }
     }
+    let k_source = |k: usize| match options.part {
+        true => ((k as f64 * basis_source.area() / basis_target.area()).round() as usize).clamp(1, k),
+        false => k,
+    };
+    let both_ways = options.both_ways && !options.part;
     let (mut map, mut back, mut functional_map) = (map.clone(), None, Matrix::default());
     for &k in &rounds {
-        let (source, target) = (basis_source.truncated(k), basis_target.truncated(k));
+        let (source, target) = (basis_source.truncated(k_source(k)), basis_target.truncated(k));
         functional_map = map_of_both(&map, back.as_ref(), &source, &target)?;
         map = recover_by(Comparison::PulledBack, &functional_map, &source, &target)?;
-        if options.both_ways && k < last {
+        if both_ways && k < last {
             let transpose = transposed(&functional_map);
             back = Some(recover_by(Comparison::PulledBack, &transpose, &target, &source)?);
         }

@@ -46,7 +46,17 @@ impl Eigenbasis {
     ///
     /// Functional maps are computed between such bases, so that a map does not depend on the size of either shape.
     pub fn at_unit_area(&self, k: usize) -> Self {
-        let area: f64 = self.mass.iter().sum();
+        self.in_unit(self.area(), k)
+    }
+
+    /// The area of the shape, in squared units of the mesh.
+    pub fn area(&self) -> f64 {
+        self.mass.iter().sum()
+    }
+
+    /// The first `k` eigenpairs where an area of `area` (above 0, in squared units of the mesh) counts as 1. For a part of
+    /// a shape it is the area of the whole, so that the eigenvalues of both are in one unit.
+    pub fn in_unit(&self, area: f64, k: usize) -> Self {
         Self {
             eigenvalues: self.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),
             eigenvectors: self.eigenvectors.first_cols(k).map(|x| x * area.sqrt()),

@@ -48,7 +48,7 @@ fn faust_registered(folder: &Path, meshes: Vec<PathBuf>) -> Found {
             (false, false) => Correspondence::Identity,
         };
         let split = faust_split(numbered(&name, "tr_reg_").unwrap_or(0));
-        ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, partial: false }
+        ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, whole: None }
     });
     let layout = if remeshed { "FAUST remeshed" } else { "FAUST registrations" };
     (layout, shapes.collect())
@@ -65,7 +65,7 @@ fn faust_scans(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
         let name = stem(&mesh);
         let split = faust_split(numbered(&name, "tr_scan_").unwrap_or(0));
         let correspondence = Correspondence::NearestTo(registration(&name)?);
-        Some(ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, partial: false })
+        Some(ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, whole: None })
     };
     Ok(scans.into_iter().filter_map(shape).collect())
 }
@@ -88,7 +88,7 @@ fn scape_shape(mesh: PathBuf) -> ShapeEntry {
     let name = stem(&mesh);
     let split = if numbered(&name, "mesh").unwrap_or(0) < 51 { Split::Train } else { Split::Test };
     let correspondence = Correspondence::Identity;
-    ShapeEntry { name, mesh, group: "scape".into(), correspondence, split, partial: false }
+    ShapeEntry { name, mesh, group: "scape".into(), correspondence, split, whole: None }
 }
 
 fn tosca_shape(mesh: PathBuf) -> ShapeEntry {
@@ -96,7 +96,7 @@ fn tosca_shape(mesh: PathBuf) -> ShapeEntry {
     let (class, number) = class_and_number(&name).unwrap_or_default();
     let split = if number % 5 == 4 { Split::Validation } else { Split::Train };
     let correspondence = Correspondence::Identity;
-    ShapeEntry { name, mesh, group: class, correspondence, split, partial: false }
+    ShapeEntry { name, mesh, group: class, correspondence, split, whole: None }
 }
 
 /// The mesh files directly in a folder, sorted by name.

@@ -13,8 +13,8 @@
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split};
 use serde::Deserialize;
-use std::collections::BTreeSet;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 /// The manifest's name in a dataset's folder.
 pub const FILE_NAME: &str = "dataset.toml";
@@ -54,6 +54,9 @@ pub(super) fn read(path: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
     }
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut names = BTreeSet::new();
+    let wholes: BTreeMap<String, PathBuf> = (manifest.shape.iter().rev().filter(|shape| !shape.partial))
+        .map(|shape| (shape.group.clone(), folder.join(&shape.mesh)))
+        .collect();
     let mut shapes = Vec::with_capacity(manifest.shape.len());
     for shape in manifest.shape {
         if !names.insert(shape.name.clone()) {
@@ -63,13 +66,20 @@ pub(super) fn read(path: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
             Some(file) => Correspondence::Vts(folder.join(file)),
             None => Correspondence::Identity,
         };
+        let whole = if shape.partial { wholes.get(&shape.group).cloned() } else { None };
+        if shape.partial && whole.is_none() {
+            return Err(wrong(format!(
+                "{:?} is partial, but its group {:?} has no whole shape",
+                shape.name, shape.group
+            )));
+        }
         shapes.push(ShapeEntry {
             name: shape.name,
             mesh: folder.join(shape.mesh),
             group: shape.group,
             correspondence,
             split: shape.split,
-            partial: shape.partial,
+            whole,
         });
     }
     Ok(shapes)

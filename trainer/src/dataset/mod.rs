@@ -59,8 +59,9 @@ pub struct ShapeEntry {
     pub correspondence: Correspondence,
     /// Its part of the dataset.
     pub split: Split,
-    /// Whether the shape is a part of a whole: it may be a source, never a target.
-    pub partial: bool,
+    /// For a part of a shape: the mesh of a whole of its group in the same unit, in whatever pose. A part may be a source, never
+    /// a target.
+    pub whole: Option<PathBuf>,
 }
 
 /// All shapes of a dataset, in a fixed order.
@@ -141,6 +142,16 @@ impl Dataset {
 }
 
 impl ShapeEntry {
+    /// Whether it is a part of a shape.
+    pub fn is_part(&self) -> bool {
+        self.whole.is_some()
+    }
+
+    /// For a part, the area of the whole, in squared units.
+    pub fn whole_area(&self) -> Result<Option<f64>, DatasetError> {
+        self.whole.as_ref().map(|whole| Ok(read_mesh(whole)?.mesh.area())).transpose()
+    }
+
     /// Reads the mesh.
     pub fn read(&self) -> Result<Mesh, DatasetError> {
         Ok(read_mesh(&self.mesh)?.mesh)

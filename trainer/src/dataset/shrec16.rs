@@ -29,7 +29,7 @@ pub(super) fn shapes(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
                         whole.clone(),
                     ),
                     split: if i < TRAINING_PARTS { Split::Train } else { Split::Test },
-                    partial: true,
+                    whole: Some(whole.clone()),
                     mesh,
                 }));
             }
@@ -40,7 +40,7 @@ pub(super) fn shapes(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
             group: class,
             correspondence: Correspondence::Identity,
             split: Split::Train,
-            partial: false,
+            whole: None,
         });
     }
     Ok(shapes)

@@ -83,9 +83,9 @@ fn the_first_ten_parts_by_number_are_for_training() {
     for number in 1..=12 {
         let split = if number <= 10 { Split::Train } else { Split::Test };
         let part = shape(&dataset, &format!("cuts_cat_shape_{number}"));
-        assert_eq!((part.split, part.partial, part.group.as_str()), (split, true, "cat"), "{number}");
+        assert_eq!((part.split, part.is_part(), part.group.as_str()), (split, true, "cat"), "{number}");
     }
-    assert!(!shape(&dataset, "dog").partial);
+    assert!(!shape(&dataset, "dog").is_part());
 }
 
 #[test]

@@ -302,7 +302,12 @@ impl Maps {
                     if let Entry::Vacant(slot) = described.entry(index) {
                         let failed =
                             |e| EvaluateError::Match { pair: shape.name.clone(), source: Box::new(e) };
-                        slot.insert(matcher.describe(&shape.name, &shape.mesh, &warnings).map_err(failed)?);
+                        let (name, mesh) = (&shape.name, &shape.mesh);
+                        let result = match shape.is_part {
+                            true => matcher.describe_part(name, mesh, target.area, &warnings),
+                            false => matcher.describe(name, mesh, &warnings),
+                        };
+                        slot.insert(result.map_err(failed)?);
                     }
                 }
                 let start = Instant::now();

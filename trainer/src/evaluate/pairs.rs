@@ -36,8 +36,9 @@ pub fn random_pairs(dataset: &Dataset, splits: &[Split], count: usize, seed: u64
     let shapes = &dataset.shapes;
     let fits = |&(s, t): &(usize, usize)| {
         let (source, target) = (&shapes[s], &shapes[t]);
-        let in_splits = splits.contains(&source.split) && (splits.contains(&target.split) || source.partial);
-        s != t && source.group == target.group && !target.partial && in_splits
+        let in_splits =
+            splits.contains(&source.split) && (splits.contains(&target.split) || source.is_part());
+        s != t && source.group == target.group && !target.is_part() && in_splits
     };
     let all = (0..shapes.len()).flat_map(|s| (0..shapes.len()).map(move |t| (s, t)));
     let mut pairs: Vec<(usize, usize)> = all.filter(fits).collect();
@@ -88,7 +89,7 @@ mod tests {
             group: group.into(),
             correspondence: Correspondence::Identity,
             split,
-            partial,
+            whole: partial.then(|| PathBuf::from("a")),
         };
         let shapes = vec![
             shape("a", "man", Split::Train, false),

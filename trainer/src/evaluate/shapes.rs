@@ -11,6 +11,8 @@ pub(super) struct LoadedShape {
     pub(super) name: String,
     pub(super) mesh: Mesh,
     pub(super) area: f64,
+    /// Whether it is a part of a shape.
+    pub(super) is_part: bool,
     /// Vertex of every point of the group.
     points: Vec<u32>,
     /// Vertex of the mirror image of every point, where the dataset knows it.
@@ -42,6 +44,7 @@ fn load_one(dataset: &Dataset, index: usize, is_target: bool) -> Result<LoadedSh
     Ok(LoadedShape {
         name: entry.name.clone(),
         area: mesh.area(),
+        is_part: entry.is_part(),
         points: entry.points(&mesh)?,
         mirrored: entry.mirrored_points(&mesh)?,
         solver: is_target.then(|| GeodesicSolver::new(&mesh, &GeodesicOptions::default())),

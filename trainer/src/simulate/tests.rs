@@ -203,7 +203,7 @@ fn written_parts_are_read_as_shrec16() {
             mesh.vertices().iter().all(|p| whole.vertices().contains(p))
         })
     };
-    for part in parts.shapes.iter().filter(|s| s.partial) {
+    for part in parts.shapes.iter().filter(|s| s.is_part()) {
         let mesh = part.read().unwrap();
         let pose = pose_of(&mesh).unwrap();
         let expected = if part.split == Split::Train { 1..3 } else { 3..4 };
@@ -221,7 +221,7 @@ fn written_parts_are_read_as_shrec16() {
         assert_eq!(of_kind().filter(|s| s.split == Split::Train).count(), 10);
         assert_eq!(of_kind().filter(|s| s.split == Split::Test).count(), 3);
     }
-    let whole = parts.shapes.iter().find(|s| !s.partial).unwrap();
+    let whole = parts.shapes.iter().find(|s| !s.is_part()).unwrap();
     assert_eq!((whole.name.as_str(), whole.read().unwrap()), ("dog", shape(0)));
 
     let few = folder_of(&["cat0.off", "cat1.off"]);

@@ -29,7 +29,20 @@ fn shape(seed: u64, signal: &[f64]) -> ShapeBatch {
 fn pair(seed: u64) -> PairBatch {
     let signal = random(100 + seed, POINTS * WIDTH);
     let negatives = (0..POINTS as u32).map(|i| (i, (i + 20) % POINTS as u32)).collect();
-    PairBatch { source: shape(2 * seed, &signal), target: shape(2 * seed + 1, &signal), negatives }
+    let (source, target) = (shape(2 * seed, &signal), shape(2 * seed + 1, &signal));
+    PairBatch { source, target, source_is_part: false, negatives }
+}
+
+/// A pair of which the source lacks the last third of the points.
+fn part_pair(seed: u64) -> PairBatch {
+    let mut pair = pair(seed);
+    let rows: Vec<u32> = (0..POINTS as u32 * 2 / 3).collect();
+    let part = &mut pair.source;
+    (part.shot, part.basis) = (part.shot.select_rows(&rows), part.basis.select_rows(&rows));
+    part.mass.truncate(rows.len());
+    part.distances = None;
+    pair.negatives.retain(|&(i, j)| (i as usize) < rows.len() && (j as usize) < rows.len());
+    PairBatch { source_is_part: true, ..pair }
 }
 
 fn runner(options: StepOptions) -> StepRunner {
@@ -49,11 +62,17 @@ fn all_options() -> Vec<StepOptions> {
     ]
 }
 
+/// All options on a pair of whole shapes, and on a part and its whole.
+fn all_cases() -> impl Iterator<Item = (StepOptions, [PairBatch; 1])> {
+    all_options()
+        .into_iter()
+        .flat_map(|options| [pair(1), part_pair(1)].map(|pair| (options.clone(), [pair])))
+}
+
 #[test]
 fn a_pair_is_learned_in_some_dozens_of_steps() {
-    for options in all_options() {
+    for (options, pairs) in all_cases() {
         let mut runner = runner(options.clone());
-        let pairs = [pair(1)];
         let first = runner.step(&pairs, 1e-2).unwrap();
         let last = (0..60).map(|_| runner.step(&pairs, 1e-2).unwrap()).last().unwrap();
         assert!(last.loss < 0.5 * first.loss, "{options:?}: {first:?} to {last:?}");
@@ -62,9 +81,8 @@ fn a_pair_is_learned_in_some_dozens_of_steps() {
 
 #[test]
 fn gradient_of_the_whole_loss_equals_differences_along_it() {
-    for options in all_options() {
+    for (options, pairs) in all_cases() {
         let mut runner = runner(options.clone());
-        let pairs = [pair(1)];
         let values = runner.network.parameter_values().unwrap();
         let (_, gradient) = runner.gradient(&pairs).unwrap();
         let gradient: Vec<f32> = gradient.to_vec1().unwrap();

@@ -109,6 +109,10 @@ pub(crate) struct MatchArgs {
     /// side, coloured alike where they match), .png (a picture of that), .html (viewer)
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
+    /// The source is a part of a shape, with holes or cut off, and the target the whole, in whatever pose; both in the same
+    /// unit of length
+    #[arg(long)]
+    pub(crate) partial: bool,
     /// Write the functional map, [k of target, k of source]
     #[arg(long, value_name = "FILE.npy")]
     pub(crate) save_functional_map: Option<PathBuf>,
@@ -126,6 +130,9 @@ pub(crate) struct BatchArgs {
     /// Format of the maps
     #[arg(long, value_name = "EXT", default_value = "txt", value_parser = ["txt", "vts", "npy", "csv"])]
     pub(crate) format: String,
+    /// Every source is a part of a shape and its target the whole, in the same unit of length
+    #[arg(long)]
+    pub(crate) partial: bool,
     /// Folder that mesh files are relative to [default: that of the list]
     #[arg(long, value_name = "DIR")]
     pub(crate) root: Option<PathBuf>,

@@ -15,19 +15,24 @@
 
 mod assignment;
 mod auction;
+mod edges;
 mod neighborhood;
 mod smooth;
 #[cfg(test)]
 mod tests;
 
 use super::{RefineError, Refined};
-use crate::Matrix;
 use crate::fmap::functional_map_of;
 use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
+use crate::{Matrix, Mesh};
 use assignment::{Assigner, DescriptorTerm};
+use edges::EdgeTerm;
 use neighborhood::Neighborhoods;
 use smooth::LocalCharts;
+
+/// Targets that a vertex can be assigned to while edges count, when it is near the right one; at most.
+const EDGE_CANDIDATES: usize = 32;
 
 /// Options of [`pmf`].
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +57,14 @@ pub struct PmfOptions {
     /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
     /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
     pub descriptor_weight: f64,
+    /// Rounds, at most, in which the edges of the source that go to edges of the target count, where the meshes are given and
+    /// seem to be triangulated alike. They stop at a map that was there before. Range 0 and up, default 30.
+    pub edge_rounds: usize,
+    /// Weight of an edge that goes to an edge, against one squared distance between neighbours. Range 0 and up, default 1.
+    pub edge_weight: f64,
+    /// Meshes are triangulated alike if at least this share of the source's edges goes to edges before those rounds. Between
+    /// separate triangulations of one surface it is about a third. Range 0 to 1, default 0.5.
+    pub alike: f64,
 }
 
 impl Default for PmfOptions {
@@ -65,17 +78,20 @@ impl Default for PmfOptions {
             neighbors_end: 10,
             candidates: 128,
             descriptor_weight: 0.5,
+            edge_rounds: 30,
+            edge_weight: 1.0,
+            alike: 0.5,
         }
     }
 }
 
-/// Pointwise descriptors of both shapes, of one width.
-#[derive(Clone, Copy, Debug)]
-pub struct PmfDescriptors<'a> {
-    /// Those of the source, `[n_source, d]`.
-    pub source: &'a Matrix<f32>,
-    /// Those of the target, `[n_target, d]`.
-    pub target: &'a Matrix<f32>,
+/// What [`pmf`] may know of the shapes besides their bases; source first.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PmfHints<'a> {
+    /// Pointwise descriptors, `[n_source, d]` and `[n_target, d]`.
+    pub descriptors: Option<[&'a Matrix<f32>; 2]>,
+    /// The meshes, of `n_source` and `n_target` vertices.
+    pub meshes: Option<[&'a Mesh; 2]>,
 }
 
 /// What [`pmf`] did.
@@ -86,6 +102,8 @@ pub struct PmfInfo {
     /// Vertices that no candidate was left for, which got what was free at the end (source no larger than the target), or the
     /// nearest target, taken or not (source larger).
     pub left_over: usize,
+    /// The share of the source's edges that go to edges of the target, before the rounds in which they count; 0 without meshes.
+    pub edges_kept: f64,
 }
 
 /// Refines a point map by the product manifold filter.
@@ -101,11 +119,11 @@ pub fn pmf(
     map: &PointMap,
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
-    descriptors: Option<PmfDescriptors>,
+    hints: PmfHints,
     options: &PmfOptions,
 ) -> Result<Refined<PmfInfo>, RefineError> {
     check(options)?;
-    check_descriptors(descriptors, basis_source.n(), basis_target.n())?;
+    check_hints(hints, basis_source.n(), basis_target.n())?;
     // Checks the point map.
     functional_map_of(map, &basis_source.truncated(1), &basis_target.truncated(1))?;
     if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
@@ -113,8 +131,9 @@ pub fn pmf(
     }
     let source = Embedding::new(basis_source, options.time_end, options.neighbors_start);
     let target = Embedding::new(basis_target, options.time_end, options.candidates);
-    let term =
-        || descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight));
+    let term = || {
+        hints.descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight))
+    };
     let around = &source.neighborhoods;
     let mut filter =
         Filter { targets: map.targets.clone(), averages: Matrix::default(), changed: Vec::new() };
@@ -130,11 +149,23 @@ pub fn pmf(
         filter.averages = charts.average(&target.rows, &filter.targets, PointMap::UNMATCHED);
         filter.assign(&assigner, around);
     }
+    let edges = hints.meshes.map(|meshes| EdgeTerm::new(meshes, options.edge_weight));
+    let edges_kept = edges.as_ref().map_or(0.0, |edges| edges.kept(&filter.targets));
+    let assigner = match &edges {
+        Some(edges) if edges_kept >= options.alike => {
+            let candidates = options.candidates.min(EDGE_CANDIDATES);
+            let assigner = Assigner::new(&target.rows, &target.neighborhoods, candidates, term());
+            let assigner = assigner.with_edges(edges);
+            filter.settle(&assigner, &source, &target, options);
+            assigner
+        }
+        _ => assigner,
+    };
     let left_over = filter.complete(&assigner, around);
     let confidence = Some(cosines(&filter.averages, &target.rows, &filter.targets));
     let map = PointMap { targets: filter.targets, confidence, n_target: basis_target.n() };
     let functional_map = functional_map_of(&map, basis_source, basis_target)?;
-    Ok(Refined { map, functional_map, info: PmfInfo { changed: filter.changed, left_over } })
+    Ok(Refined { map, functional_map, info: PmfInfo { changed: filter.changed, left_over, edges_kept } })
 }
 
 /// A shape in the coordinates in which heat kernels are inner products.
@@ -166,6 +197,21 @@ impl Filter {
         let changed = targets.iter().zip(&self.targets).filter(|(new, old)| new != old).count();
         self.changed.push(changed as f64 / targets.len() as f64);
         self.targets = targets;
+    }
+
+    /// Assigns by local averages until the map comes back, which it may do after two rounds as matches change places.
+    fn settle(&mut self, assigner: &Assigner, source: &Embedding, target: &Embedding, options: &PmfOptions) {
+        let charts = LocalCharts::new(&source.rows, &source.neighborhoods, options.neighbors_end);
+        let mut before_last = Vec::new();
+        for _ in 0..options.edge_rounds {
+            let last = self.targets.clone();
+            self.averages = charts.average(&target.rows, &self.targets, PointMap::UNMATCHED);
+            self.assign(assigner, &source.neighborhoods);
+            if self.targets == last || self.targets == before_last {
+                break;
+            }
+            before_last = last;
+        }
     }
 
     /// Matches what is left without; returns how many those were.
@@ -224,12 +270,14 @@ fn log_steps(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| from * ratio.powf((at(i) - at(0)) / (1.0 - at(0)))).collect()
 }
 
-fn check_descriptors(
-    descriptors: Option<PmfDescriptors>,
-    n_source: usize,
-    n_target: usize,
-) -> Result<(), RefineError> {
-    let Some(PmfDescriptors { source, target }) = descriptors else { return Ok(()) };
+fn check_hints(hints: PmfHints, n_source: usize, n_target: usize) -> Result<(), RefineError> {
+    if let Some([source, target]) = hints.meshes
+        && (source.n_vertices(), target.n_vertices()) != (n_source, n_target)
+    {
+        let found = [source.n_vertices(), target.n_vertices()];
+        return Err(RefineError::Meshes { found, n_source, n_target });
+    }
+    let Some([source, target]) = hints.descriptors else { return Ok(()) };
     if source.rows() != n_source || target.rows() != n_target || source.cols() != target.cols() {
         let found = [source.rows(), source.cols(), target.rows(), target.cols()];
         return Err(RefineError::Descriptors { found, n_source, n_target });
@@ -247,6 +295,12 @@ fn check(options: &PmfOptions) -> Result<(), RefineError> {
     }
     if !(options.descriptor_weight >= 0.0 && options.descriptor_weight.is_finite()) {
         return bad("descriptor_weight", options.descriptor_weight, "0 or more".into());
+    }
+    if !(options.edge_weight >= 0.0 && options.edge_weight.is_finite()) {
+        return bad("edge_weight", options.edge_weight, "0 or more".into());
+    }
+    if !(0.0..=1.0).contains(&options.alike) {
+        return bad("alike", options.alike, "from 0 to 1".into());
     }
     let sizes = [
         ("neighbors_end", options.neighbors_end, 4),

@@ -1,6 +1,7 @@
 use super::*;
 use crate::fmap::test_basis::{flipped, rectangle, reordered, shuffle};
-use crate::mesh::shapes::{bumpy_sphere, open_half_sphere, permuted};
+use crate::mesh::nearest_vertices;
+use crate::mesh::shapes::{bumpy_sphere, icosphere, open_half_sphere, permuted, rotation, transformed};
 use crate::point_map::recover;
 use crate::spectral::{EigenOptions, Laplacian, eigenbasis};
 use rand::{Rng, SeedableRng};
@@ -46,7 +47,8 @@ fn corrupted(targets: &[u32], n_target: usize) -> PointMap {
 fn the_identity_stays() {
     let basis = rectangle(30, 40, 150);
     let identity: Vec<u32> = (0..1200).collect();
-    let refined = pmf(&PointMap::new(identity.clone(), 1200), &basis, &basis, None, &coarse()).unwrap();
+    let refined =
+        pmf(&PointMap::new(identity.clone(), 1200), &basis, &basis, PmfHints::default(), &coarse()).unwrap();
     assert_eq!(refined.map.targets, identity);
     assert_eq!(refined.info.left_over, 0);
     assert!(refined.map.confidence.unwrap().iter().all(|&confidence| confidence > 0.9));
@@ -59,7 +61,7 @@ fn a_noisy_permutation_of_a_bumpy_sphere_is_repaired() {
     let (source, target) = (basis_of(&mesh, 120), basis_of(&copy, 120));
     let start = corrupted(&place, place.len());
     assert!(share_of(&start, &place) < 0.7);
-    let refined = pmf(&start, &source, &target, None, &coarse()).unwrap();
+    let refined = pmf(&start, &source, &target, PmfHints::default(), &coarse()).unwrap();
     assert!(is_injective(&refined.map));
     assert!(share_of(&refined.map, &place) > 0.97, "{}", share_of(&refined.map, &place));
     assert!(refined.info.changed.last().is_some_and(|&changed| changed < 0.05), "{:?}", refined.info);
@@ -72,7 +74,7 @@ fn signs_and_order_do_not_matter() {
     let target = reordered(&flipped(&source), &order);
     let mut place = vec![0; 1200];
     order.iter().enumerate().for_each(|(i, &vertex)| place[vertex as usize] = i as u32);
-    let refined = pmf(&corrupted(&place, 1200), &source, &target, None, &coarse()).unwrap();
+    let refined = pmf(&corrupted(&place, 1200), &source, &target, PmfHints::default(), &coarse()).unwrap();
     assert!(is_injective(&refined.map));
     assert!(share_of(&refined.map, &place) > 0.95, "{}", share_of(&refined.map, &place));
 }
@@ -83,7 +85,7 @@ fn a_smaller_source_is_mapped_injectively_and_a_larger_one_completely() {
     for (source, target) in [(&small, &large), (&large, &small)] {
         let c = Matrix::from_fn(100, 100, |i, j| f64::from(i == j));
         let start = recover(&c, source, target).unwrap();
-        let refined = pmf(&start, source, target, None, &coarse()).unwrap();
+        let refined = pmf(&start, source, target, PmfHints::default(), &coarse()).unwrap();
         assert!(refined.map.targets.iter().all(|&t| (t as usize) < target.n()));
         assert_eq!(is_injective(&refined.map), source.n() <= target.n());
         // Two spacings of the coarser grid apart at most, all but a few.
@@ -112,7 +114,7 @@ fn a_part_is_matched_to_the_whole() {
         let mut start =
             PointMap::new((0..source.n()).map(|x| start[x % start.len()] % n as u32).collect(), n);
         start.targets.iter_mut().step_by(2).for_each(|target| *target = PointMap::UNMATCHED);
-        let refined = pmf(&start, source, target, None, &coarse()).unwrap();
+        let refined = pmf(&start, source, target, PmfHints::default(), &coarse()).unwrap();
         assert!(refined.map.targets.iter().all(|&t| (t as usize) < n));
         assert_eq!(is_injective(&refined.map), source.n() <= n);
     }
@@ -122,9 +124,14 @@ fn a_part_is_matched_to_the_whole() {
 fn tiny_shapes_and_bases_are_no_trouble() {
     for (nx, ny, k) in [(1, 1, 1), (2, 1, 2), (3, 3, 1), (5, 4, 20)] {
         let basis = rectangle(nx, ny, k);
-        let refined =
-            pmf(&PointMap::new(vec![0; nx * ny], nx * ny), &basis, &basis, None, &PmfOptions::default())
-                .unwrap();
+        let refined = pmf(
+            &PointMap::new(vec![0; nx * ny], nx * ny),
+            &basis,
+            &basis,
+            PmfHints::default(),
+            &PmfOptions::default(),
+        )
+        .unwrap();
         assert!(is_injective(&refined.map), "{nx} x {ny}, k = {k}");
     }
 }
@@ -138,14 +145,40 @@ fn descriptors_decide_what_kernels_cannot() {
     let descriptors = Matrix::from_fn(600, 8, |_, _| rng.random_range(-1.0f32..1.0));
     let shifted: Vec<u32> = (0..600).map(|v| if v % 20 < 19 { v + 1 } else { v }).collect();
     let start = PointMap::new(shifted, 600);
-    let with = Some(PmfDescriptors { source: &descriptors, target: &descriptors });
+    let with = PmfHints { descriptors: Some([&descriptors, &descriptors]), meshes: None };
     let options = PmfOptions { descriptor_weight: 10.0, ..coarse() };
     let (plain, told) = (
-        pmf(&start, &basis, &basis, None, &options).unwrap(),
+        pmf(&start, &basis, &basis, PmfHints::default(), &options).unwrap(),
         pmf(&start, &basis, &basis, with, &options).unwrap(),
     );
     let shares = [share_of(&plain.map, &identity), share_of(&told.map, &identity)];
     assert!(shares[1] > 0.99 && shares[1] >= shares[0], "{shares:?}");
+}
+
+#[test]
+fn edges_of_one_triangulation_make_the_map_exact() {
+    let mesh = bumpy_sphere(3, 5);
+    let (copy, place) = permuted(&mesh, 3);
+    let (source, target) = (basis_of(&mesh, 60), basis_of(&copy, 60));
+    // So few eigenfunctions cannot tell neighbours apart everywhere.
+    let run = |hints| pmf(&corrupted(&place, place.len()), &source, &target, hints, &coarse()).unwrap();
+    let plain = run(PmfHints::default());
+    let told = run(PmfHints { meshes: Some([&mesh, &copy]), descriptors: None });
+    assert!(told.info.edges_kept > 0.5 && told.info.changed.len() > plain.info.changed.len());
+    assert_eq!(told.map.targets, place, "{}", share_of(&plain.map, &place));
+    // A separate triangulation of the same surface.
+    let turned = turned_sphere(3);
+    let (sphere, other) = (basis_of(&icosphere(3), 60), basis_of(&turned, 60));
+    let nearest = nearest_vertices(turned.vertices(), icosphere(3).vertices());
+    let start = PointMap::new(nearest, turned.n_vertices());
+    let hints = PmfHints { meshes: Some([&icosphere(3), &turned]), descriptors: None };
+    let apart = pmf(&start, &sphere, &other, hints, &coarse()).unwrap();
+    assert!(apart.info.edges_kept < 0.5, "{}", apart.info.edges_kept);
+}
+
+/// A sphere whose triangulation is turned against that of [`icosphere`].
+fn turned_sphere(subdivisions: u32) -> crate::Mesh {
+    transformed(&icosphere(subdivisions), rotation([0.3, 0.5, 0.8], 0.4), 1.0, [0.0; 3])
 }
 
 #[test]
@@ -158,20 +191,31 @@ fn options_out_of_range_are_errors() {
         PmfOptions { time_start: f64::NAN, ..default.clone() },
         PmfOptions { time_start: 1e-9, ..default.clone() },
         PmfOptions { descriptor_weight: -1.0, ..default.clone() },
+        PmfOptions { edge_weight: f64::NAN, ..default.clone() },
+        PmfOptions { alike: 1.1, ..default.clone() },
     ] {
-        assert!(matches!(pmf(&map, &basis, &basis, None, &options), Err(RefineError::RealOption { .. })));
+        assert!(matches!(
+            pmf(&map, &basis, &basis, PmfHints::default(), &options),
+            Err(RefineError::RealOption { .. })
+        ));
     }
     for options in [
         PmfOptions { neighbors_end: 3, ..default.clone() },
         PmfOptions { neighbors_start: 5, ..default.clone() },
         PmfOptions { candidates: 0, ..default.clone() },
     ] {
-        assert!(matches!(pmf(&map, &basis, &basis, None, &options), Err(RefineError::Option { .. })));
+        assert!(matches!(
+            pmf(&map, &basis, &basis, PmfHints::default(), &options),
+            Err(RefineError::Option { .. })
+        ));
     }
     let nothing = PointMap::new(vec![PointMap::UNMATCHED; 72], 72);
-    assert_eq!(pmf(&nothing, &basis, &basis, None, &default).unwrap_err(), RefineError::NothingMatched);
+    assert_eq!(
+        pmf(&nothing, &basis, &basis, PmfHints::default(), &default).unwrap_err(),
+        RefineError::NothingMatched
+    );
     let wrong = Matrix::zeros(71, 4);
-    let descriptors = Some(PmfDescriptors { source: &wrong, target: &wrong });
+    let descriptors = PmfHints { descriptors: Some([&wrong, &wrong]), meshes: None };
     assert!(matches!(
         pmf(&map, &basis, &basis, descriptors, &default),
         Err(RefineError::Descriptors { found: [71, 4, 71, 4], .. })
@@ -184,7 +228,7 @@ fn thread_count_does_not_matter() {
     let start = corrupted(&(0..1200).collect::<Vec<u32>>(), 1200);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| pmf(&start, &basis, &basis, None, &coarse()).unwrap())
+        pool.install(|| pmf(&start, &basis, &basis, PmfHints::default(), &coarse()).unwrap())
     };
     assert!(run(1) == run(3));
 }

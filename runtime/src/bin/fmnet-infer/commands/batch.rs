@@ -34,7 +34,7 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
             skipped += 1;
             continue;
         }
-        match match_pair(pair, &mut shapes, console) {
+        match match_pair(pair, args.partial, &mut shapes, console) {
             Ok(()) => {
                 done += 1;
                 console.say(&format!("{} of {}: {}", number + 1, pairs.len(), pair.out.display()));
@@ -58,35 +58,49 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     Ok(())
 }
 
-fn match_pair(pair: &Pair, shapes: &mut Shapes, console: &Console) -> Result<()> {
-    let source = shapes.get(&pair.source, console)?;
-    let target = shapes.get(&pair.target, console)?;
+fn match_pair(pair: &Pair, partial: bool, shapes: &mut Shapes, console: &Console) -> Result<()> {
+    let target = shapes.get(&pair.target, None, console)?;
+    let whole_area = partial.then(|| target.shape.full_mesh.area());
+    let source = shapes.get(&pair.source, whole_area, console)?;
     let result = shapes.matcher.match_shapes(&source, &target, &|event| console.event(event))?;
     Ok(write_point_map(&pair.out, &result.map)?)
 }
 
+/// A shape's file and, where it is a part, the bits of the area of the whole.
+type ShapeKey = (PathBuf, Option<u64>);
+
 /// The shapes used last.
 struct Shapes<'a> {
     matcher: &'a Matcher,
-    kept: BTreeMap<PathBuf, Arc<DescribedShape>>,
-    order: Vec<PathBuf>,
+    kept: BTreeMap<ShapeKey, Arc<DescribedShape>>,
+    order: Vec<ShapeKey>,
 }
 
 impl Shapes<'_> {
-    fn get(&mut self, path: &Path, console: &Console) -> Result<Arc<DescribedShape>> {
-        self.order.retain(|p| p != path);
-        self.order.push(path.to_path_buf());
-        if let Some(shape) = self.kept.get(path) {
+    /// The shape of a file; with the area of the whole, as a part.
+    fn get(
+        &mut self,
+        path: &Path,
+        whole_area: Option<f64>,
+        console: &Console,
+    ) -> Result<Arc<DescribedShape>> {
+        let key = (path.to_path_buf(), whole_area.map(f64::to_bits));
+        self.order.retain(|other| *other != key);
+        self.order.push(key.clone());
+        if let Some(shape) = self.kept.get(&key) {
             return Ok(shape.clone());
         }
-        let mesh = read(path, console)?;
-        let shape = self.matcher.describe(&file_name(path), &mesh, &|event| console.event(event))?;
-        let shape = Arc::new(shape);
+        let (mesh, name) = (read(path, console)?, file_name(path));
+        let observer = |event| console.event(event);
+        let shape = Arc::new(match whole_area {
+            Some(area) => self.matcher.describe_part(&name, &mesh, area, &observer)?,
+            None => self.matcher.describe(&name, &mesh, &observer)?,
+        });
         if self.kept.len() == KEPT_SHAPES {
             let oldest = self.order.remove(0);
             self.kept.remove(&oldest);
         }
-        self.kept.insert(path.to_path_buf(), shape.clone());
+        self.kept.insert(key, shape.clone());
         Ok(shape)
     }
 }

@@ -19,7 +19,10 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     let target = read(&args.target, console)?;
     let (name_source, name_target) = (file_name(&args.source), file_name(&args.target));
     let (described_source, described_target) = rayon::join(
-        || matcher.describe(&name_source, &source, &observer),
+        || match args.partial {
+            true => matcher.describe_part(&name_source, &source, target.area(), &observer),
+            false => matcher.describe(&name_source, &source, &observer),
+        },
         || matcher.describe(&name_target, &target, &observer),
     );
     let result = matcher.match_shapes(&described_source?, &described_target?, &observer)?;

@@ -1,0 +1,51 @@
+//! A part of a body matched to a whole one in another pose.
+
+use fmnet::Mesh;
+use fmnet::eval::{GroundTruth, geodesic_errors};
+use fmnet::events::ignore;
+use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
+use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
+use fmnet::point_map::PointMap;
+use fmnet::synth::{Species, demo_pair};
+
+/// What is left of a mesh without its highest fifth along an axis; the vertices there are no longer in any face.
+fn cut(mesh: &Mesh, axis: usize) -> Mesh {
+    let heights = || mesh.vertices().iter().map(|p| p[axis]);
+    let (lowest, highest) =
+        (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+    let limit = highest - 0.2 * (highest - lowest);
+    let faces = mesh.faces().iter().copied();
+    let kept = faces.filter(|face| face.iter().all(|&i| mesh.vertices()[i as usize][axis] < limit));
+    Mesh::new(mesh.vertices().to_vec(), kept.collect()).unwrap()
+}
+
+/// The axis along which a body is longest.
+fn long_axis(mesh: &Mesh) -> usize {
+    let extent = |axis: usize| {
+        let heights = || mesh.vertices().iter().map(|p| p[axis]);
+        heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min)
+    };
+    (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap()
+}
+
+#[test]
+fn a_part_described_as_such_finds_its_place() {
+    let pair = demo_pair(Species::Man, 0);
+    let (part, whole) = (cut(&pair.source.mesh, long_axis(&pair.source.mesh)), &pair.target.mesh);
+    let matcher = Matcher::new(&MatchOptions::default()).unwrap();
+    let target = matcher.describe("whole", whole, &ignore).unwrap();
+    let solver = GeodesicSolver::new(whole, &GeodesicOptions::default());
+    let truth = PointMap::new(pair.ground_truth.clone(), whole.n_vertices());
+    let mean_error = |part: &DescribedShape| {
+        let found = matcher.match_shapes(part, &target, &ignore).unwrap().map;
+        let matched = |i: usize| if found.get(i).is_some() { truth.targets[i] } else { PointMap::UNMATCHED };
+        let kept = PointMap::new((0..truth.len()).map(matched).collect(), whole.n_vertices());
+        let truth = GroundTruth::from_map(&kept).unwrap();
+        let errors = geodesic_errors(&found, &truth, &solver, whole.area()).unwrap();
+        errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64
+    };
+    let as_part = mean_error(&matcher.describe_part("part", &part, whole.area(), &ignore).unwrap());
+    let as_whole = mean_error(&matcher.describe("part", &part, &ignore).unwrap());
+    assert!(as_part < 0.05, "{as_part}");
+    assert!(as_part < 0.8 * as_whole, "{as_part}, as a whole {as_whole}");
+}
