@@ -5,6 +5,7 @@ mod colormap;
 mod pair;
 mod picture;
 mod transfer;
+mod uv;
 mod viewer;
 
 pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
