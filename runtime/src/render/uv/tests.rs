@@ -51,8 +51,7 @@ fn a_texture_moves_to_a_finer_mesh_without_steps_or_smears() {
         // Away from the poles, where the longitude means nothing, and from the seam.
         let counts = |t: &[Uv; 3]| t.iter().all(|[u, v]| (0.2..0.8).contains(v) && (0.1..0.9).contains(u));
         let pairs: Vec<_> = moved.iter().zip(&own).filter(|(_, own)| counts(own)).collect();
-        let off =
-            |(a, b): &(&[Uv; 3], &[Uv; 3])| (0..3).map(|i| (a[i][0] - b[i][0]).abs()).sum::<f32>();
+        let off = |(a, b): &(&[Uv; 3], &[Uv; 3])| (0..3).map(|i| (a[i][0] - b[i][0]).abs()).sum::<f32>();
         pairs.iter().map(off).sum::<f32>() / (3 * pairs.len()) as f32
     };
     let (steps, smooth) = (error(&donors), error(&donors.clone().interpolated(&fine, &coarse)));
