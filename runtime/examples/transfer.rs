@@ -68,7 +68,7 @@ fn front_and_back(mesh: &Mesh) -> Vec<[[f32; 2]; 3]> {
 fn squares() -> Picture {
     let pixel = |i: usize| {
         let (row, column) = (i / TEXTURE, i % TEXTURE);
-        let light = if (row / SQUARE + 2 * column / SQUARE) % 2 == 0 { 1.0 } else { 0.55 };
+        let light = if (row / SQUARE + 2 * column / SQUARE).is_multiple_of(2) { 1.0 } else { 0.55 };
         let height = (row / SQUARE * SQUARE) as f64 / TEXTURE as f64;
         let wave = |phase: f64| 0.6 + 0.4 * (TAU * (height + phase)).cos();
         let back = if column < TEXTURE / 2 { 0.0 } else { 0.5 };
