@@ -35,8 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_mesh(&folder.join("giver.obj"), &giver, &attributes)?;
     // Each body faces another way; they are turned toward the viewer.
     let mut pictures = vec![pictured(&giver, &attributes, &image, PI + 0.3)];
-    let heavy = demo_pair(Species::Heavy, 0).source.mesh;
-    for (name, receiver, turn) in [("man", target.mesh, 0.6 - FRAC_PI_2), ("heavy", heavy, PI - 0.3)] {
+    let other = demo_pair(Species::Man, 1).source.mesh;
+    for (name, receiver, turn) in [("sitting", target.mesh, 0.6 - FRAC_PI_2), ("other", other, -0.7)] {
         let found = match_meshes(&receiver, &giver, &MatchOptions::default())?;
         let donors = Donors::of_source(&found.map).interpolated(&receiver, &giver);
         let moved = transfer_attributes(&giver, &attributes, &receiver, &donors);

@@ -31,7 +31,7 @@ fn damaged_surface() -> impl Strategy<Value = Mesh> {
             _ => vec![face],
         };
         let faces = mesh.faces().iter().enumerate().flat_map(fate).collect();
-        Mesh::new(mesh.vertices().to_vec(), faces).unwrap()
+        Mesh::new(mesh.vertices().to_vec(), faces).expect("the faces are of the mesh")
     })
 }
 

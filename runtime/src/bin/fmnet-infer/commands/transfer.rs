@@ -115,7 +115,11 @@ fn write_transferred_values(
         );
     }
     let moved = transfer_values(&values, donors);
-    Ok(if moved.cols() == 1 { write_vector(output, moved.data())? } else { write_matrix(output, &moved)? })
+    match moved.cols() {
+        1 => write_vector(output, moved.data())?,
+        _ => write_matrix(output, &moved)?,
+    }
+    Ok(())
 }
 
 fn read_landmarks(path: &Path, mesh: &Mesh) -> Result<Vec<u32>> {
