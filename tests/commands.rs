@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use fmnet::Matrix;
-use fmnet::io::{read_matrix, read_mesh, read_vector};
+use fmnet::io::{Attributes, Texture, read_matrix, read_mesh, read_vector, write_mesh, write_vector};
 use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};
 use fmnet_tests::{SHOT, Workplace, targets};
 
@@ -147,6 +147,66 @@ fn transfer_and_evaluation_follow_the_map() {
     let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(summary["maps"][0]["summary"]["exact"], 1.0);
     assert!(std::fs::read_to_string(work.path("curve.svg")).unwrap().starts_with("<svg"));
+}
+
+/// A textured OBJ to another mesh, as OBJ and GLB; and values beside it.
+#[test]
+fn a_texture_and_values_are_carried_over() {
+    let work = Workplace::new();
+    let mesh = bumpy_sphere(3, 1);
+    let uvs = (0..mesh.n_faces()).map(|f| mesh.corners(f).map(|p| [0.25 * p[0] as f32, 0.25 * p[1] as f32]));
+    std::fs::write(work.path("skin.png"), b"\x89PNG, as far as a reference goes").unwrap();
+    let attributes = Attributes {
+        corner_uvs: Some(uvs.collect()),
+        texture: Some(Texture::File(work.path("skin.png"))),
+        ..Attributes::default()
+    };
+    write_mesh(&work.path("giver.obj"), &mesh, &attributes).unwrap();
+    work.mesh("a.off", &mesh);
+    let identity: String = (0..mesh.n_vertices()).map(|i| format!("{i}\n")).collect();
+    std::fs::write(work.path("id.txt"), identity).unwrap();
+    let field: Vec<f32> = (0..mesh.n_vertices()).map(|v| v as f32).collect();
+    write_vector(&work.path("field.npy"), &field).unwrap();
+    let transfer = ["transfer", "a.off", "giver.obj", "--map", "id.txt"];
+    let outputs = ["-o", "t.obj", "-o", "t.glb", "--values", "field.npy", "-o", "moved.npy"];
+    work.succeed(&[&transfer[..], &outputs].concat());
+    let obj = read_mesh(&work.path("t.obj")).unwrap();
+    assert_eq!(
+        obj.attributes,
+        Attributes { texture: Some(Texture::File(work.path("skin.png"))), ..attributes.clone() }
+    );
+    let glb = read_mesh(&work.path("t.glb")).unwrap();
+    // glTF counts v from the top.
+    let uvs_of = |attributes: &Attributes| attributes.corner_uvs.clone().unwrap().into_flattened();
+    let pairs = uvs_of(&glb.attributes).into_iter().zip(uvs_of(&attributes));
+    assert!(pairs.into_iter().all(|(a, b)| a[0] == b[0] && (a[1] - b[1]).abs() < 1e-6));
+    assert!(matches!(glb.attributes.texture, Some(Texture::Embedded { .. })));
+    assert_eq!(read_vector::<f32>(&work.path("moved.npy")).unwrap(), field);
+    for (outputs, culprit) in [
+        (&["-o", "t.ply", "--values", "field.npy"][..], "no output is left"),
+        (&["-o", "moved.npy"], "no --values file is left"),
+        (&["-o", "moved.txt", "--values", "field.npy"], ".npy file"),
+        (&["-o", "moved.csv", "--values", "field.npy"], "unknown kind of output"),
+        (&["-o", "absent/t.ply"], "does not exist"),
+    ] {
+        let message = work.fail(&[&transfer[..], outputs].concat(), 2);
+        assert!(message.contains(culprit), "{outputs:?}: {message}");
+        assert!(!work.path("t.ply").exists());
+    }
+    std::fs::remove_file(work.path("giver.mtl")).unwrap();
+    let warned = work.run(&[&transfer[..], &["-o", "t.ply"]].concat());
+    assert!(String::from_utf8_lossy(&warned.stderr).contains("giver.mtl"));
+}
+
+/// What only matters to matching is refused, not ignored.
+#[test]
+fn features_take_no_options_of_matching() {
+    let work = Workplace::new();
+    work.mesh("a.off", &bumpy_sphere(2, 1));
+    for option in [["--refine", "icp"], ["--upscale", "l21"], ["--fm", "two-way"], ["--mask-weight", "0.1"]] {
+        let message = work.fail(&[&["features", "a.off", "--out", "f"][..], &option].concat(), 2);
+        assert!(message.contains(option[0]), "{message}");
+    }
 }
 
 #[test]

@@ -198,6 +198,7 @@ fn every_option_that_a_page_names_exists() {
         "path",
         "bin",
         "bench",
+        "example",
         "test",
         "features",
         "no-default-features",

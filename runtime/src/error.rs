@@ -14,6 +14,7 @@ use thiserror::Error;
 
 /// What can go wrong between two meshes and their map.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file cannot be read or written.
     #[error(transparent)]

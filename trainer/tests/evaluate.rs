@@ -4,8 +4,12 @@
 use fmnet::Mesh;
 use fmnet::io::{Attributes, write_mesh};
 use fmnet::mesh::shapes::{bumpy_sphere, transformed};
+#[cfg(unix)]
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+#[cfg(unix)]
+use std::process::Stdio;
 
 fn train() -> Command {
     Command::new(env!("CARGO_BIN_EXE_fmnet-train"))
@@ -96,11 +100,15 @@ fn an_experiment_trains_tests_and_reports_and_does_nothing_twice() {
     copies(&data.join("faust/remeshed_5k"), &names, 3);
     copies(&data.join("scape"), &["mesh000.off", "mesh001.off"], 3);
     let out = work.path().join("out");
-    let run = || {
+    let reproduce = || {
         let mut command = train();
         command.args(["reproduce", "scape-transfer", "--steps", "2", "--pairs", "2", "--json"]);
-        succeed(command.arg("--data").arg(&data).arg("--out").arg(&out))
+        command.arg("--data").arg(&data).arg("--out").arg(&out);
+        command
     };
+    #[cfg(unix)]
+    is_interrupted_after(&mut reproduce(), "evaluated", &out);
+    let run = || succeed(&mut reproduce());
     let json: serde_json::Value = serde_json::from_str(&run()).unwrap();
     let report = PathBuf::from(json["report"].as_str().unwrap());
     let html = std::fs::read_to_string(&report).unwrap();
@@ -112,4 +120,28 @@ fn an_experiment_trains_tests_and_reports_and_does_nothing_twice() {
     assert_eq!(steps(&metrics()), 2);
     run();
     assert_eq!(steps(&metrics()), 2, "the second call trains again");
+}
+
+/// Interrupts a command when it says `word`: it must end with status 130, without a report or a half-written file.
+#[cfg(unix)]
+fn is_interrupted_after(command: &mut Command, word: &str, out: &Path) {
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.any(|line| line.unwrap().contains(word)), "it never says {word:?}");
+    let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(signal.success());
+    lines.for_each(drop);
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let mut folders = vec![out.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            assert!(
+                path.extension().is_none_or(|e| e != "tmp" && e != "html"),
+                "{} is there",
+                path.display()
+            );
+            folders.extend(path.is_dir().then_some(path));
+        }
+    }
 }

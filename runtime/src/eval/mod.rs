@@ -29,6 +29,7 @@ use thiserror::Error;
 
 /// Why a map or descriptors could not be evaluated.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum EvalError {
     /// Two things that must describe the same shape have different sizes.
     #[error(

@@ -9,6 +9,7 @@ use thiserror::Error;
 
 /// Why a file could not be read or written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum IoError {
     /// The operating system refused to read the file.
     #[error("cannot read {}: {source}", path.display())]

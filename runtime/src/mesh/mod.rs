@@ -34,6 +34,7 @@ pub struct Mesh {
 
 /// Why vertices and faces do not make a [`Mesh`].
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum MeshError {
     /// A face names a vertex that does not exist.
     #[error("face {face} refers to vertex {index}, but there are only {n_vertices} vertices (0-based)")]

@@ -190,6 +190,11 @@ pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, Network
     }
     check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}")))?;
     check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}")))?;
+    if !graph.node.iter().any(|node| node.output.iter().any(|name| name == OUTPUT)) {
+        return Err(contract(format!(
+            "no operator gives {OUTPUT:?}; the file is damaged, export the model anew"
+        )));
+    }
     let values = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
     ModelMetadata::from_pairs(&Pairs { path, values })
 }
@@ -207,5 +212,50 @@ fn check_value(values: &[ValueInfo], name: &str) -> Result<(), String> {
     match dims.as_slice() {
         [None | Some(0), Some(width)] if *width == WIDTH as i64 => Ok(()),
         _ => Err(format!("expected the shape [n, {WIDTH}] with n dynamic, found {dims:?}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::proto::{Dimension, Graph, Model, Node, Shape, StringEntry, TensorType};
+
+    /// A model whose only operator gives a value of this name.
+    fn model_giving(name: &str) -> Vec<u8> {
+        let dim = [None, Some(WIDTH as i64)].map(|value| Dimension { value }).to_vec();
+        let kind = Type { tensor: Some(TensorType { elem_type: ONNX_FLOAT, shape: Some(Shape { dim }) }) };
+        let value = |name: &str| ValueInfo { name: name.into(), kind: Some(kind.clone()) };
+        let metadata = ModelMetadata {
+            format_version: 1,
+            shot: ShotOptions::default(),
+            k: 20,
+            solver: FmapSolver::LeastSquares,
+            decimate: None,
+            per_shape_statistics: false,
+            training_set: String::new(),
+            seed: 0,
+            steps: 0,
+            commit: String::new(),
+            license: String::new(),
+        };
+        let pairs = metadata.to_pairs().into_iter();
+        let model = Model {
+            graph: Some(Graph {
+                node: vec![Node { output: vec![name.into()], op_type: "Identity".into() }],
+                input: vec![value(INPUT)],
+                output: vec![value(OUTPUT)],
+            }),
+            opset_import: Vec::new(),
+            metadata_props: pairs.map(|(key, value)| StringEntry { key, value }).collect(),
+        };
+        model.encode_to_vec()
+    }
+
+    #[test]
+    fn the_output_must_be_computed() {
+        let path = Path::new("m.onnx");
+        assert!(read_contract(path, &model_giving(OUTPUT)).is_ok());
+        let error = read_contract(path, &model_giving("descriptorz")).unwrap_err().to_string();
+        assert!(error.contains("no operator gives \"descriptors\""), "{error}");
     }
 }

@@ -39,6 +39,7 @@ impl fmt::Display for Backend {
 
 /// Why a model cannot be loaded or run.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// The file cannot be read.
     #[error("{path}: {reason}")]

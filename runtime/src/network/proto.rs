@@ -47,6 +47,8 @@ pub(super) struct Graph {
 /// `NodeProto`.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Node {
+    #[prost(string, repeated, tag = "2")]
+    pub(super) output: Vec<String>,
     #[prost(string, tag = "4")]
     pub(super) op_type: String,
 }

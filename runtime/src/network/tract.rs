@@ -9,6 +9,7 @@ use super::contract::{ModelMetadata, WIDTH};
 use crate::Matrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 use tract_linalg::multithread::{Executor, multithread_tract_scope};
 use tract_onnx::prelude::*;
@@ -28,7 +29,8 @@ pub(super) struct TractEngine {
 
 impl TractEngine {
     pub(super) fn load(bytes: &[u8], metadata: &ModelMetadata) -> Result<Self, String> {
-        let graph = tract_onnx::onnx().model_for_read(&mut &*bytes).map_err(|e| format!("{e:#}"))?;
+        let graph =
+            guarded(|| tract_onnx::onnx().model_for_read(&mut &*bytes).map_err(|e| format!("{e:#}")))?;
         Ok(Self { graph, rows_depend: metadata.per_shape_statistics, plans: Mutex::default() })
     }
 
@@ -64,18 +66,41 @@ impl TractEngine {
     }
 }
 
+/// tract panics on some damaged graphs; that is an error like any other.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    let refused = |panic: Box<dyn std::any::Any + Send>| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("of unknown kind");
+        Err(format!("the graph is damaged ({text}); export the model anew"))
+    };
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(refused)
+}
+
 impl Engine for TractEngine {
     fn run(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, String> {
         let values = if self.rows_depend {
-            multithread_tract_scope(Executor::RayonGlobal, || self.run_rows(shot.data()))?
+            multithread_tract_scope(Executor::RayonGlobal, || guarded(|| self.run_rows(shot.data())))?
         } else {
             let blocks: Vec<Vec<f32>> = shot
                 .data()
                 .par_chunks(BLOCK_ROWS * WIDTH)
-                .map(|rows| self.run_rows(rows))
+                .map(|rows| guarded(|| self.run_rows(rows)))
                 .collect::<Result<_, _>>()?;
             blocks.concat()
         };
         Ok(Matrix::from_vec(shot.rows(), WIDTH, values))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::guarded;
+
+    #[test]
+    fn a_panic_is_an_error() {
+        assert_eq!(guarded(|| Ok(3)), Ok(3));
+        let index = std::hint::black_box(2);
+        let error = guarded(|| Ok([1, 2][index])).unwrap_err();
+        assert!(error.contains("out of bounds") && error.contains("export"), "{error}");
     }
 }

@@ -38,6 +38,7 @@ impl Comparison {
 
 /// Why no point map can be recovered.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum RecoverError {
     /// The functional map is not one between these bases.
     #[error(

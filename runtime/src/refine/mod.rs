@@ -27,6 +27,7 @@ pub struct Refined<Info> {
 
 /// Why a map cannot be refined.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum RefineError {
     /// An option is out of its range.
     #[error("{option} is {value}, but must be {range}")]

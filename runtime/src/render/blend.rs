@@ -57,7 +57,7 @@ pub(super) fn blends(donors: &Donors, receiver: &Mesh, giver: &Mesh) -> Vec<Opti
     blends
 }
 
-fn faces_around(mesh: &Mesh) -> Vec<Vec<u32>> {
+pub(super) fn faces_around(mesh: &Mesh) -> Vec<Vec<u32>> {
     let mut faces = vec![Vec::new(); mesh.n_vertices()];
     for (f, face) in mesh.faces().iter().enumerate() {
         face.iter().for_each(|&v| faces[v as usize].push(f as u32));
@@ -65,13 +65,13 @@ fn faces_around(mesh: &Mesh) -> Vec<Vec<u32>> {
     faces
 }
 
-fn combine(weights: [f64; 3], corners: [[f64; 3]; 3]) -> [f64; 3] {
+pub(super) fn combine(weights: [f64; 3], corners: [[f64; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = [0, 1, 2].map(|i| vec3::scale(corners[i], weights[i]));
     vec3::add(vec3::add(a, b), c)
 }
 
 /// Barycentric weights of the point of a triangle that is closest to `p`: inside, or on the closest side.
-fn closest_point(p: [f64; 3], corners: [[f64; 3]; 3]) -> [f64; 3] {
+pub(super) fn closest_point(p: [f64; 3], corners: [[f64; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = corners;
     let normal = vec3::cross(vec3::sub(b, a), vec3::sub(c, a));
     let squared = vec3::dot(normal, normal);

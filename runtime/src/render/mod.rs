@@ -5,10 +5,11 @@ mod colormap;
 mod pair;
 mod picture;
 mod transfer;
+mod uv;
 mod viewer;
 
 pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
 pub use pair::side_by_side;
-pub use picture::{Picture, pair_picture, picture};
+pub use picture::{Picture, pair_picture, picture, textured_picture};
 pub use transfer::{Donors, transfer_attributes, transfer_landmarks, transfer_values};
 pub use viewer::{ViewerPair, viewer_html};

@@ -41,14 +41,44 @@ pub fn picture(mesh: &Mesh, colors: &[[u8; 4]], width: usize, height: usize) -> 
     let mut canvas = Canvas::new(width, height);
     let points = on_screen(mesh, width, height);
     for &face in mesh.faces() {
-        let corners = face.map(|v| points[v as usize]);
         let shades = face.map(|v| colors.get(v as usize).copied().unwrap_or([180, 180, 180, 255]));
-        canvas.triangle(corners, shades);
+        let mixed = |weights: [f64; 3]| {
+            [0, 1, 2].map(|channel| (0..3).map(|i| weights[i] * f64::from(shades[i][channel])).sum())
+        };
+        canvas.triangle(face.map(|v| points[v as usize]), mixed);
+    }
+    canvas.finish()
+}
+
+/// A mesh seen as in [`picture`], with an image on it: `corner_uvs`, `[m, 3, 2]`, are the texture coordinates of its triangles'
+/// corners, `(0, 0)` the image's lower left; the image repeats beyond its edges.
+pub fn textured_picture(
+    mesh: &Mesh,
+    corner_uvs: &[[[f32; 2]; 3]],
+    image: &Picture,
+    width: usize,
+    height: usize,
+) -> Picture {
+    let mut canvas = Canvas::new(width, height);
+    let points = on_screen(mesh, width, height);
+    for (&face, uvs) in mesh.faces().iter().zip(corner_uvs) {
+        let texel = |weights: [f64; 3]| {
+            let [u, v] = [0, 1].map(|c| (0..3).map(|i| weights[i] * f64::from(uvs[i][c])).sum::<f64>());
+            image.at(u, v).map(f64::from)
+        };
+        canvas.triangle(face.map(|v| points[v as usize]), texel);
     }
     canvas.finish()
 }
 
 impl Picture {
+    /// The pixel at texture coordinates; white if there are none.
+    fn at(&self, u: f64, v: f64) -> [u8; 3] {
+        let place = |x: f64, size: usize| ((x.rem_euclid(1.0) * size as f64) as usize).min(size.max(1) - 1);
+        let (column, row) = (place(u, self.width), place(1.0 - v, self.height));
+        self.pixels.get(row * self.width + column).copied().unwrap_or(BACKGROUND)
+    }
+
     /// The picture as a PNG file.
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -106,8 +136,8 @@ impl Canvas {
         }
     }
 
-    /// Draws a triangle with colours and depth interpolated between its corners.
-    fn triangle(&mut self, corners: [[f64; 3]; 3], colors: [[u8; 4]; 3]) {
+    /// Draws a triangle with depth interpolated between its corners and the colours that belong to barycentric weights.
+    fn triangle(&mut self, corners: [[f64; 3]; 3], color: impl Fn([f64; 3]) -> [f64; 3]) {
         let corners = corners.map(|c| c.map(|v| v * OVERSAMPLING as f64));
         let [a, b, c] = corners;
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -131,11 +161,7 @@ impl Canvas {
                 let pixel = row * self.width + column;
                 if weights.iter().all(|&w| w >= 0.0) && depth > self.depth[pixel] {
                     self.depth[pixel] = depth;
-                    self.pixels[pixel] = [0, 1, 2].map(|channel| {
-                        let mixed: f64 =
-                            weights.iter().zip(&colors).map(|(w, color)| w * f64::from(color[channel])).sum();
-                        (light * mixed).clamp(0.0, 255.0) as u8
-                    });
+                    self.pixels[pixel] = color(weights).map(|c| (light * c).clamp(0.0, 255.0) as u8);
                 }
             }
         }
@@ -196,6 +222,21 @@ mod tests {
         assert_eq!(picture.pixels[20 * 40 + 20], [250, 0, 0]);
         assert_eq!(picture.pixels[20 * 40 + 4], [0, 0, 250]);
         assert_eq!(picture.pixels[0], BACKGROUND);
+    }
+
+    #[test]
+    fn an_image_lies_on_the_mesh_the_right_way_up() {
+        let vertices =
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [x, y, 0.0]).to_vec();
+        let mesh = Mesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let uvs = [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]]];
+        let image = Picture { width: 2, height: 2, pixels: (1..5).map(|i| [50 * i, 0, 0]).collect() };
+        let drawn = textured_picture(&mesh, &uvs, &image, 40, 40);
+        let quarters =
+            [(10, 10), (10, 30), (30, 10), (30, 30)].map(|(row, column)| drawn.pixels[row * 40 + column]);
+        assert_eq!(quarters.to_vec(), image.pixels);
+        let nothing = Picture { width: 0, height: 0, pixels: Vec::new() };
+        assert_eq!(textured_picture(&mesh, &uvs, &nothing, 40, 40).pixels[20 * 40 + 20], BACKGROUND);
     }
 
     #[test]

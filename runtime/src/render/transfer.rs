@@ -5,6 +5,7 @@
 //! [`Donors::interpolated`] finds places within the giver's triangles.
 
 use super::blend::{Blend, blends};
+use super::uv::corner_uvs;
 use crate::io::{Attributes, Skin};
 use crate::mesh::{Topology, vec3};
 use crate::point_map::PointMap;
@@ -90,6 +91,16 @@ impl Donors {
         self.nearest.iter().copied()
     }
 
+    /// The giving vertex of a receiving one.
+    pub(super) fn vertex(&self, receiving: usize) -> Option<u32> {
+        self.nearest[receiving]
+    }
+
+    /// The place that a receiving vertex takes from, where it was interpolated.
+    pub(super) fn blend(&self, receiving: usize) -> Option<Blend> {
+        self.places[receiving].map(|place| place.blend)
+    }
+
     /// Vertices and weights that each receiving vertex takes from; `None` without a match.
     fn shares(&self) -> impl Iterator<Item = Option<[(usize, f64); 3]>> + '_ {
         self.nearest.iter().zip(&self.places).map(|(nearest, place)| match place {
@@ -152,8 +163,8 @@ pub fn transfer_landmarks(
 
 /// Colours, texture coordinates, scalar fields and skin weights of the giver, for the receiver's vertices and corners.
 ///
-/// Vertices without a match are grey, at the texture's origin, NaN and without weights. At a seam of the giver's texture a vertex
-/// has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
+/// Vertices without a match are grey, NaN and without weights, triangles without any at the texture's origin. At a seam of the giver's
+/// texture a vertex has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
 pub fn transfer_attributes(
     giver: &Mesh,
     attributes: &Attributes,
@@ -208,65 +219,6 @@ fn transfer_skin(skin: &Skin, donors: &Donors) -> Skin {
     Skin { joints: skin.joints.clone(), indices, weights }
 }
 
-fn corner_uvs(giver: &Mesh, uvs: &[[[f32; 2]; 3]], receiver: &Mesh, donors: &Donors) -> Vec<[[f32; 2]; 3]> {
-    let mut of_vertex: Vec<Vec<[f32; 2]>> = vec![Vec::new(); giver.n_vertices()];
-    for (face, corners) in giver.faces().iter().zip(uvs) {
-        for (&v, &uv) in face.iter().zip(corners) {
-            if !of_vertex[v as usize].contains(&uv) {
-                of_vertex[v as usize].push(uv);
-            }
-        }
-    }
-    // A place within a triangle has one texture coordinate, a vertex one for each side of a seam.
-    let within = |v: u32| {
-        donors.places[v as usize].map(|Place { blend, .. }| {
-            let corners = uvs[blend.face as usize];
-            [0, 1].map(|c| (0..3).map(|i| blend.weights[i] * f64::from(corners[i][c])).sum::<f64>() as f32)
-        })
-    };
-    let triangle = |face: &[u32; 3]| {
-        let places = face.map(within);
-        let at_vertices = |v: u32| donors.nearest[v as usize].map_or(&[][..], |d| &of_vertex[d as usize]);
-        let choices =
-            [0, 1, 2].map(|i| places[i].as_ref().map_or(at_vertices(face[i]), std::slice::from_ref));
-        let chosen = closest_together(choices);
-        // Larger than the giver's triangles there: it would span a seam.
-        let of_giver =
-            face.iter().filter_map(|&v| Some(extent(uvs[donors.places[v as usize]?.blend.face as usize])));
-        let largest = of_giver.fold(0.0, f32::max);
-        if largest > 0.0 && extent(chosen) > 4.0 * largest {
-            closest_together(face.map(at_vertices))
-        } else {
-            chosen
-        }
-    };
-    receiver.faces().iter().map(triangle).collect()
-}
-
-/// Sum of the squared sides of a triangle in the texture.
-fn extent([a, b, c]: [[f32; 2]; 3]) -> f32 {
-    let distance = |p: [f32; 2], q: [f32; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
-    distance(a, b) + distance(b, c) + distance(c, a)
-}
-
-/// Of each corner's choices the ones that make the smallest triangle in the texture.
-fn closest_together(choices: [&[[f32; 2]]; 3]) -> [[f32; 2]; 3] {
-    const NOWHERE: &[[f32; 2]] = &[[0.0, 0.0]];
-    let [a, b, c] = choices.map(|options| if options.is_empty() { NOWHERE } else { options });
-    let mut best = ([a[0], b[0], c[0]], f32::INFINITY);
-    for &p in a {
-        for &q in b {
-            for &r in c {
-                let size = extent([p, q, r]);
-                if size < best.1 {
-                    best = ([p, q, r], size);
-                }
-            }
-        }
-    }
-    best.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,48 +253,6 @@ mod tests {
             let tie = (corner(v, 0) - corner(v, 99)).abs() < 0.3;
             assert!(tie || donor == Some(nearer), "vertex {v} takes from {donor:?}");
         }
-    }
-
-    #[test]
-    fn no_triangle_spans_a_seam() {
-        let uvs = [&[[0.0, 0.5], [1.0, 0.5]][..], &[[0.9, 0.5]][..], &[[0.95, 0.6]][..]];
-        assert_eq!(closest_together(uvs)[0], [1.0, 0.5]);
-    }
-
-    /// Longitude and latitude as texture coordinates, with a seam where the longitude wraps.
-    fn map_of_the_globe(mesh: &Mesh) -> Vec<[[f32; 2]; 3]> {
-        let place = |v: u32| {
-            let [x, y, z] = mesh.vertices()[v as usize];
-            [(y.atan2(x) / std::f64::consts::TAU + 0.5) as f32, (0.5 + 0.5 * z) as f32]
-        };
-        let unwrapped = |corners: [[f32; 2]; 3]| {
-            let largest = corners.iter().map(|c| c[0]).fold(0.0, f32::max);
-            corners.map(|[u, v]| [if largest - u > 0.5 { u + 1.0 } else { u }, v])
-        };
-        mesh.faces().iter().map(|face| unwrapped(face.map(place))).collect()
-    }
-
-    #[test]
-    fn a_texture_moves_to_a_finer_mesh_without_steps_or_smears() {
-        let (coarse, fine) = (icosphere(2), icosphere(4));
-        let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
-        let donors = Donors::of_source(&PointMap::new(nearest, coarse.n_vertices()));
-        let (uvs, own) = (map_of_the_globe(&coarse), map_of_the_globe(&fine));
-        let largest = uvs.iter().map(|t| extent(*t)).fold(0.0, f32::max);
-        let error = |donors: &Donors| {
-            let moved = corner_uvs(&coarse, &uvs, &fine, donors);
-            assert!(moved.iter().all(|t| extent(*t) <= 4.0 * largest), "a triangle spans the seam");
-            // Away from the poles, where the longitude means nothing, and from the seam.
-            let counts =
-                |t: &[[f32; 2]; 3]| t.iter().all(|[u, v]| (0.2..0.8).contains(v) && (0.1..0.9).contains(u));
-            let pairs: Vec<_> = moved.iter().zip(&own).filter(|(_, own)| counts(own)).collect();
-            let off = |(a, b): &(&[[f32; 2]; 3], &[[f32; 2]; 3])| {
-                (0..3).map(|i| (a[i][0] - b[i][0]).abs()).sum::<f32>()
-            };
-            pairs.iter().map(off).sum::<f32>() / (3 * pairs.len()) as f32
-        };
-        let (steps, smooth) = (error(&donors), error(&donors.clone().interpolated(&fine, &coarse)));
-        assert!(smooth < 0.6 * steps, "{smooth} interpolated, {steps} from the nearest vertex");
     }
 
     #[test]

@@ -48,6 +48,7 @@ pub const UNMATCHED: u32 = u32::MAX;
 
 /// Why bodies could not be made or written.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SynthError {
     /// An option is out of its range.
     #[error("option {option} is {value}, but must be {range}")]

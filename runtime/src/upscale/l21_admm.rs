@@ -50,6 +50,7 @@ pub struct AdmmInfo {
 
 /// Why a functional map could not be upscaled.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum UpscaleError {
     /// The two sides do not have one row for each match.
     #[error("{source_rows} source rows and {target_rows} target rows: each match needs one of both")]

@@ -53,9 +53,9 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
 }
 
-/// Options that decide how shapes are processed and matched.
+/// Options that decide what is computed of a shape.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct PipelineArgs {
+pub(crate) struct ShapeArgs {
     /// Model file, or the name of one in ./models [default: the model built into this program]
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) model: Option<String>,
@@ -68,27 +68,34 @@ pub(crate) struct PipelineArgs {
     /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
-    #[arg(long, value_enum)]
-    pub(crate) fm: Option<SolverKind>,
-    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
-    #[arg(long, value_parser = non_negative)]
-    pub(crate) mask_weight: Option<f64>,
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
     #[arg(long, value_name = "N|off", value_parser = decimation)]
     pub(crate) decimate: Option<Decimation>,
-    /// Refinement of the map [default: zoomout; none with SHOT]
-    #[arg(long, value_enum)]
-    pub(crate) refine: Option<Refinement>,
-    /// How the map of decimated meshes becomes one of the full meshes
-    #[arg(long, value_enum, default_value = "l21")]
-    pub(crate) upscale: Upscaling,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
     #[arg(long, value_parser = radius)]
     pub(crate) shot_radius: Option<f64>,
     /// Keep what is computed of each shape in this folder, and use what is there
     #[arg(long, value_name = "DIR")]
     pub(crate) cache: Option<PathBuf>,
+}
+
+/// Options that decide how shapes are processed and matched.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PipelineArgs {
+    #[command(flatten)]
+    pub(crate) shape: ShapeArgs,
+    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
+    #[arg(long, value_enum)]
+    pub(crate) fm: Option<SolverKind>,
+    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
+    #[arg(long, value_parser = non_negative)]
+    pub(crate) mask_weight: Option<f64>,
+    /// Refinement of the map [default: zoomout; none with SHOT]
+    #[arg(long, value_enum)]
+    pub(crate) refine: Option<Refinement>,
+    /// How the map of decimated meshes becomes one of the full meshes
+    #[arg(long, value_enum, default_value = "l21")]
+    pub(crate) upscale: Upscaling,
 }
 
 #[derive(Debug, Args)]
@@ -154,11 +161,11 @@ pub(crate) struct TransferArgs {
     #[arg(long, value_enum, default_value = "source")]
     pub(crate) to: Receiver,
     /// Per-vertex values of the giving mesh to carry over as well: scalar fields or skin weights [n] or [n, q] (.npy),
-    /// or landmarks (.txt, a 0-based vertex a line)
+    /// or landmarks (.txt, a 0-based vertex a line); each needs an output of its extension
     #[arg(long, value_name = "FILE")]
     pub(crate) values: Vec<PathBuf>,
-    /// Output: a mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file; or, for each --values
-    /// in turn, a file of the same kind
+    /// Output: the receiving mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file; or, for each
+    /// --values in turn, a file of the same kind (.npy, .txt)
     #[arg(short, long = "output", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
 }
@@ -180,7 +187,7 @@ pub(crate) struct FeaturesArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
-    pub(crate) pipeline: PipelineArgs,
+    pub(crate) shape: ShapeArgs,
 }
 
 #[derive(Debug, Args)]
@@ -241,20 +248,30 @@ fn radius(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number between 0 and 1".into())
 }
 
-impl PipelineArgs {
-    /// The library's options.
+impl ShapeArgs {
+    /// The library's options, those of matching at their defaults.
     pub(crate) fn to_options(&self) -> MatchOptions {
         MatchOptions {
             descriptor: self.descriptor,
             model: self.model.as_deref().map_or(ModelSource::Embedded, |m| ModelSource::File(model_path(m))),
             backend: self.backend,
             k: self.k.map(usize::from),
-            solver: FmapSolver::chosen(self.fm, self.mask_weight),
             shot_radius: self.shot_radius,
             decimate: self.decimate.map(|d| d.0),
+            cache: self.cache.clone(),
+            ..MatchOptions::default()
+        }
+    }
+}
+
+impl PipelineArgs {
+    /// The library's options.
+    pub(crate) fn to_options(&self) -> MatchOptions {
+        MatchOptions {
+            solver: FmapSolver::chosen(self.fm, self.mask_weight),
             refinement: self.refine,
             upscaling: self.upscale,
-            cache: self.cache.clone(),
+            ..self.shape.to_options()
         }
     }
 }

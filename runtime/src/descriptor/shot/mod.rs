@@ -94,6 +94,7 @@ pub struct ShotInfo {
 
 /// Why [`shot`] could not describe a mesh.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ShotError {
     /// The radius is not a positive number.
     #[error(

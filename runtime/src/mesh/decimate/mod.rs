@@ -37,6 +37,7 @@ pub struct Decimated {
 
 /// Why a mesh cannot be decimated.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum DecimateError {
     /// Fewer vertices than a closed surface has.
     #[error("decimation to {target} vertices leaves no surface; ask for 4 or more")]

@@ -91,6 +91,7 @@ impl fmt::Display for RepairReport {
 
 /// Why a mesh cannot be repaired.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum RepairError {
     /// There are no faces, as in a point cloud.
     #[error("the mesh has {n_vertices} vertices but no faces; reconstruct a surface from the points first")]

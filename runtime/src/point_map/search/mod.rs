@@ -37,6 +37,7 @@ pub struct Nearest {
 
 /// Why a nearest neighbour search is not possible.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum SearchError {
     /// There is no target to be near to.
     #[error("there are no target rows to search among")]

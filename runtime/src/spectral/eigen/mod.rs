@@ -88,6 +88,7 @@ pub struct EigenInfo {
 
 /// Why there is no eigenbasis.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum EigenError {
     /// No pairs, or more than the mesh has.
     #[error("{k} eigenpairs of a mesh of {n} vertices: ask for 1 to {limit}, or use a finer mesh")]

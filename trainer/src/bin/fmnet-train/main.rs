@@ -13,6 +13,7 @@ use fmnet::synth::SynthError;
 use fmnet_trainer::checkpoint::CheckpointError;
 use fmnet_trainer::export::ExportError;
 use fmnet_trainer::precompute::PrepareError;
+use fmnet_trainer::reproduce::ReproduceError;
 use fmnet_trainer::simulate::SimulateError;
 use fmnet_trainer::train::TrainError;
 use std::process::ExitCode;
@@ -42,7 +43,11 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(if is_own_failure(&error) { 1 } else { 2 })
+            ExitCode::from(match error.downcast_ref() {
+                Some(ReproduceError::Stopped(_)) => interrupt::INTERRUPTED,
+                _ if is_own_failure(&error) => 1,
+                _ => 2,
+            })
         }
     }
 }

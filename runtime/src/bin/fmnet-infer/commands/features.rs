@@ -10,7 +10,7 @@ use fmnet::pipeline::Matcher;
 use serde_json::json;
 
 pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
-    let matcher = Matcher::new(&args.pipeline.to_options())?;
+    let matcher = Matcher::new(&args.shape.to_options())?;
     let mesh = read(&args.mesh, console)?;
     let described = matcher.describe(&file_name(&args.mesh), &mesh, &|event| console.event(event))?;
     create_folder(&args.out)?;

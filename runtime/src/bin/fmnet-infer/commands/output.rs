@@ -48,10 +48,16 @@ fn kind(path: &Path) -> Result<Kind> {
 pub(crate) fn check(outputs: &[std::path::PathBuf]) -> Result<()> {
     for path in outputs {
         kind(path)?;
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if !folder.is_dir() {
-            bail!("{}: the folder {} does not exist; create it first", path.display(), folder.display());
-        }
+        check_folder(path)?;
+    }
+    Ok(())
+}
+
+/// Refuses an output in a folder that does not exist.
+pub(crate) fn check_folder(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        bail!("{}: the folder {} does not exist; create it first", path.display(), folder.display());
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use crate::args::{Common, ReproduceArgs};
 use crate::interrupt;
 use crate::progress::Progress;
 use anyhow::{Context, Result};
+use fmnet::events::Event;
 use fmnet_trainer::reproduce::{Observers, Settings, experiment, run as run_experiment};
 use serde_json::json;
 
@@ -18,8 +19,12 @@ pub(crate) fn run(args: &ReproduceArgs, common: &Common) -> Result<()> {
     };
     let experiment = experiment(&args.experiment, &settings).context("no experiment of this name")?;
     let progress = Progress::new(common);
-    let observers =
-        Observers { training: &|event| progress.event(event), rest: &|event| progress.stage(event) };
+    // A training stops in order by itself; the other stages tell of each piece of work that is done.
+    let rest = |event: Event| {
+        progress.stage(event);
+        interrupt::end_if_asked();
+    };
+    let observers = Observers { training: &|event| progress.event(event), rest: &rest };
     let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, interrupt::stop())?;
     progress.say(&format!("report: {}", report.display()));
     if common.json {
