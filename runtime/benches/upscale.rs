@@ -7,13 +7,15 @@
 //! `cargo bench --bench upscale -- [SOURCE TARGET] [--subdivisions N] [--vertices N]`: mesh files of one connectivity; without
 //! them a generated body and a bent copy of it.
 
+use fmnet::Mesh;
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::mesh::{DecimateOptions, Decimated, decimate, nearest_vertices, shapes};
 use fmnet::point_map::{PointMap, recover};
 use fmnet::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use fmnet::synth::{Species, demo_pair};
-use fmnet::upscale::{AdmmOptions, delta_coefficients, l21_functional_map, least_squares_functional_map};
-use fmnet::{Matrix, Mesh};
+use fmnet::upscale::{
+    AdmmOptions, delta_coefficients, full_point_map, l21_functional_map, least_squares_functional_map,
+};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -103,14 +105,17 @@ fn measure(source: &Mesh, target: &Mesh, n_work: usize) {
         });
         let plain = least_squares_functional_map(&phi, &psi).expect("enough matches");
         for (name, map) in [("l2,1", &robust), ("least squares", &plain)] {
-            let full = read_off(map, &basis_source, &basis_target);
+            let full = timed("nearest neighbours", || {
+                recover(map, &basis_source, &basis_target).expect("the map fits its bases")
+            });
             println!("  {name}: error of the full map {:.3}", error(&whole_map(&full)));
         }
+        let full = timed("full point map", || {
+            full_point_map(&robust, &basis_source, &basis_target, source.vertices(), &matches)
+                .expect("the map fits its bases")
+        });
+        println!("  l2,1 and residuals: error of the full map {:.3}", error(&whole_map(&full)));
     }
-}
-
-fn read_off(c: &Matrix, basis_source: &Eigenbasis, basis_target: &Eigenbasis) -> PointMap {
-    timed("full point map", || recover(c, basis_source, basis_target).expect("the map fits its bases"))
 }
 
 fn basis_of(mesh: &Mesh) -> Eigenbasis {

@@ -16,12 +16,13 @@ use crate::events::{Event, Observer, timed};
 use crate::fmap::{FmapInfo, FmapSolver, functional_map};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
-use crate::point_map::{Comparison, PointMap, recover, recover_by};
+use crate::point_map::{Comparison, PointMap, recover_by};
 use crate::refine::{IcpOptions, PmfHints, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::upscale::{
-    AdmmInfo, AdmmOptions, delta_coefficients, l21_functional_map, least_squares_functional_map,
+    AdmmInfo, AdmmOptions, delta_coefficients, full_point_map, l21_functional_map,
+    least_squares_functional_map,
 };
 use crate::{Matrix, Mesh};
 use serde::{Deserialize, Serialize};
@@ -360,7 +361,10 @@ impl Matcher {
             }
             Upscaling::LeastSquares => least_squares_functional_map(&phi, &psi).map(|c| (c, None)),
         })?;
-        let map = timed(observer, pair, "full point map", || recover(&full_map, &full_source, &full_target))?;
+        let map = timed(observer, pair, "full point map", || {
+            let vertices = source.shape.full_mesh.vertices();
+            full_point_map(&full_map, &full_source, &full_target, vertices, &matches)
+        })?;
         Ok((map, info))
     }
 

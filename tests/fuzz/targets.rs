@@ -225,8 +225,12 @@ fn shapes(folder: &Path) -> Target {
         write_mesh(&path, &mesh, &Attributes::default()).unwrap();
         std::fs::read(&path).unwrap()
     });
-    let options =
-        ShapeOptions { k: 6, decimate: Some(60), shot: ShotOptions { radius: 0.3, ..Default::default() } };
+    let options = ShapeOptions {
+        k: 6,
+        decimate: Some(60),
+        shot: ShotOptions { radius: 0.3, ..Default::default() },
+        ..ShapeOptions::default()
+    };
     let target = Target::new(seeds.collect(), move |bytes| {
         let Ok(file) = decode_mesh(bytes, Path::new("a.off")) else { return false };
         inspect(&file.mesh);
@@ -296,7 +300,7 @@ fn barycentric(folder: &Path) -> Target {
         group: "g".into(),
         correspondence: Correspondence::Barycentric(path.clone(), whole),
         split: Split::Train,
-        partial: true,
+        whole: Some(PathBuf::from("whole.off")),
     };
     Target::new(
         vec![("1 1 0 0\n".repeat(grid(2, 2).n_vertices() - 2) + "2 0.25 0.5 0.25\n8 0 0 1\n").into()],

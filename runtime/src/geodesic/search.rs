@@ -102,6 +102,32 @@ impl<'a> Search<'a> {
             }
             current += 1;
         }
+        if remaining > 0 {
+            self.reach_the_rest();
+        }
+    }
+
+    /// Distances to the vertices that no edge onward leads to, as may happen on rough surfaces: through their own edges.
+    fn reach_the_rest(&mut self) {
+        let mut missed: Vec<u32> = (0..self.distances.len() as u32)
+            .filter(|&v| self.distances[v as usize] == f32::INFINITY)
+            .collect();
+        loop {
+            let before = missed.len();
+            missed.retain(|&v| {
+                let edges = self.graph.edges[self.graph.edges_of(v)].iter();
+                let through = edges.map(|edge| self.distances[edge.head as usize] + edge.length);
+                let distance = through.fold(f32::INFINITY, f32::min);
+                if distance < f32::INFINITY {
+                    self.distances[v as usize] = distance;
+                    self.touched.push(v);
+                }
+                distance == f32::INFINITY
+            });
+            if missed.len() == before {
+                return;
+            }
+        }
     }
 
     fn relax(&mut self, range: std::ops::Range<usize>, distance: f32) -> usize {

@@ -2,7 +2,10 @@
 
 use super::{GeodesicOptions, GeodesicSolver, exact, zoo};
 use crate::Mesh;
+use crate::mesh::shapes::bumpy_sphere;
 use crate::mesh::vec3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 fn solver(mesh: &Mesh) -> GeodesicSolver {
     GeodesicSolver::new(mesh, &GeodesicOptions::default())
@@ -201,4 +204,23 @@ fn faces_on_top_of_each_other_end_in_time() {
     let found = GeodesicSolver::new(&doubled, &options).from_source(5);
     let worst = single.iter().zip(&found).map(|(a, b)| (a - b).abs() / a.max(0.1)).fold(0.0, f32::max);
     assert!(worst < 0.05, "distances differ by {worst}");
+}
+
+#[test]
+fn every_vertex_of_a_rough_surface_is_reached() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let smooth = bumpy_sphere(4, 2);
+    let rough = |size: f64, rng: &mut ChaCha8Rng| {
+        let moved = smooth.vertices().iter().map(|p| p.map(|x| x + size * rng.random_range(-1.0..1.0)));
+        Mesh::new(moved.collect(), smooth.faces().to_vec()).unwrap()
+    };
+    for size in [0.005, 0.02, 0.05] {
+        let mesh = rough(size, &mut rng);
+        let solver =
+            GeodesicSolver::new(&mesh, &GeodesicOptions { n_neighbors: 40, ..GeodesicOptions::default() });
+        for source in 0..20 {
+            let distances = solver.from_source(source * 100);
+            assert!(distances.iter().all(|d| d.is_finite()), "{size}, from {}", source * 100);
+        }
+    }
 }

@@ -95,6 +95,15 @@ pub fn recover_by(
     Ok(PointMap { targets, confidence: Some(confidence), n_target: basis_target.n() })
 }
 
+/// For each row of `transported`, `[n_source, k_target]`, the nearest row of the target's eigenvectors.
+pub(crate) fn recover_transported(
+    transported: &Matrix,
+    basis_target: &Eigenbasis,
+) -> Result<PointMap, RecoverError> {
+    let (targets, confidence) = nearest_with_cosine(transported, &basis_target.eigenvectors)?;
+    Ok(PointMap { targets, confidence: Some(confidence), n_target: basis_target.n() })
+}
+
 /// For each query the nearest row, and the cosine of the angle between the two.
 fn nearest_with_cosine(queries: &Matrix, rows: &Matrix) -> Result<(Vec<u32>, Vec<f32>), SearchError> {
     let nearest = nearest_rows(queries, rows)?.index;

@@ -2,8 +2,9 @@
 //!
 //! Every vertex of the decimated source gives a match between two vertices of the full shapes. The functional map of the
 //! full shapes that agrees best with these matches, [`l21_functional_map`], is then read off at every vertex by nearest
-//! neighbour. The l2,1 norm lets wrong matches stay wrong instead of bending the map towards them.
+//! neighbour, [`full_point_map`]. The l2,1 norm lets wrong matches stay wrong instead of bending the map towards them.
 
+mod interpolate;
 mod l21_admm;
 mod least_squares;
 
@@ -11,6 +12,7 @@ pub use l21_admm::{AdmmInfo, AdmmOptions, UpscaleError, l21_functional_map};
 pub use least_squares::least_squares_functional_map;
 
 use crate::Matrix;
+use crate::point_map::{PointMap, RecoverError, recover_transported, transport};
 use crate::spectral::Eigenbasis;
 
 /// The values of the eigenfunctions at the matched vertices, `[m, k_source]` and `[m, k_target]`.
@@ -25,4 +27,22 @@ pub fn delta_coefficients(
 ) -> (Matrix, Matrix) {
     let (sources, targets): (Vec<u32>, Vec<u32>) = matches.iter().copied().unzip();
     (basis_source.eigenvectors.select_rows(&sources), basis_target.eigenvectors.select_rows(&targets))
+}
+
+/// The point map of the full shapes, of a functional map `c`, `[k_target, k_source]`, of theirs and the matches that it was found from.
+///
+/// For each source vertex `x` the target vertex whose row of `psi` is nearest to `C phi(x)` plus what `C` misses at the matches
+/// near `x`, as far as these are right. The paper does without the latter; then the map of the full shapes is as smooth as
+/// `k` eigenfunctions, and worse than that of the decimated ones. `vertices` are the positions of the source, `[n_source]`.
+pub fn full_point_map(
+    c: &Matrix,
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    vertices: &[[f64; 3]],
+    matches: &[(u32, u32)],
+) -> Result<PointMap, RecoverError> {
+    let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
+    let mut transported = transport(phi, c);
+    interpolate::add_residuals(&mut transported, phi, psi, vertices, matches);
+    recover_transported(&transported, basis_target)
 }
