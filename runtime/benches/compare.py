@@ -6,8 +6,8 @@
 
 It builds the programs and the benches, gets the peers' packages from PyPI (pinned, in an environment of its own beside the
 build), runs each bench and its peer on the same data, and runs `fmnet-infer match` as a user would, cold and with a cache, from
-1K to 200K vertices. A peer that cannot be installed is skipped, and the page says so. Where a peer's result differs from ours
-the exit status is 1.
+1K to 200K vertices. A peer that cannot be installed is skipped, and the page says so. Where a peer's result differs from ours,
+or a program of ours fails, the exit status is 1.
 
 Needs Rust and Python with venv (3.11 or newer for the pinned packages), Linux or macOS, about 8 GB of memory, and no research
 data. On 2 cores it takes about 20 minutes; nothing else should run meanwhile.
@@ -69,7 +69,7 @@ def main():
     for figure in disagreeing:
         print(f"DISAGREES: {figure['case']} with {figure['peer']}: {figure['agreement']}", file=sys.stderr)
     print(f"{chosen.out / 'benchmarks.md'} written; {time.monotonic() - started:.0f} s")
-    return 1 if disagreeing else 0
+    return 1 if disagreeing or run.failed else 0
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ PEERS = pathlib.Path("runtime/benches/peers")
 
 
 class Run:
-    """One run of the comparison: the programs built, the Python with the peers' packages, and what was skipped."""
+    """One run of the comparison: the programs built, the Python with the peers' packages, what was skipped and what failed."""
 
     def __init__(self, root, quick, dry_run):
         self.root = root
@@ -23,6 +23,7 @@ class Run:
         self.executables = {}
         self.python = None
         self.skipped = []
+        self.failed = []
         self.cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
     def build(self):
@@ -94,32 +95,37 @@ class Run:
         print(" ".join([*words, shlex.join(str(word) for word in command)]), file=sys.stderr, flush=True)
 
     def execute(self, command, variables=None):
-        """Runs a command. Its output, and its wall seconds, CPU seconds and peak memory; (None, None) where it failed."""
+        """Runs a command. Its output, as far as it came, and its wall seconds, CPU seconds and peak memory, None where it failed."""
         self.say([pathlib.Path(command[0]).name, *command[1:]], variables)
         if self.dry_run:
             return "", {"seconds": 0.0, "cpu_seconds": 0.0, "peak_mb": 0.0}
         with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+            environment = {**os.environ, **(variables or {})}
+            words = [str(word) for word in command]
             start = time.perf_counter()
-            child = subprocess.Popen(
-                [str(word) for word in command], cwd=self.root, stdout=out, stderr=err, env={**os.environ, **(variables or {})}
-            )
+            child = subprocess.Popen(words, cwd=self.root, stdout=out, stderr=err, env=environment)
             _, status, usage = os.wait4(child.pid, 0)
             seconds = time.perf_counter() - start
             child.returncode = os.waitstatus_to_exitcode(status)
             out.seek(0)
             err.seek(0)
-            messages = err.read().strip().splitlines()
-            for line in messages:
-                if line.startswith("skipped ") and command[0] == self.python:
-                    self.skip(line.removeprefix("skipped "))
-            if child.returncode != 0:
-                reason = messages[-1] if messages else f"exit status {child.returncode}"
-                self.skip(f"{pathlib.Path(command[0]).name} {pathlib.Path(str(command[1])).name}: it failed ({reason})")
-                return None, None
-            # Linux counts in KiB, macOS in bytes.
-            unit = 1e-6 if sys.platform == "darwin" else 1024e-6
-            cpu = usage.ru_utime + usage.ru_stime
-            return out.read(), {"seconds": seconds, "cpu_seconds": cpu, "peak_mb": usage.ru_maxrss * unit}
+            output, messages = out.read(), err.read().strip().splitlines()
+        is_peer = words[0] == self.python
+        for line in messages:
+            if line.startswith("skipped ") and is_peer:
+                self.skip(line.removeprefix("skipped "))
+        # Linux counts in KiB, macOS in bytes.
+        unit = 1e-6 if sys.platform == "darwin" else 1024e-6
+        cost = {"seconds": seconds, "cpu_seconds": usage.ru_utime + usage.ru_stime, "peak_mb": usage.ru_maxrss * unit}
+        if child.returncode == 0:
+            return output, cost
+        reason = messages[-1] if messages else f"exit status {child.returncode}"
+        if is_peer:
+            self.skip(f"the rest of {words[1]}: {reason}")
+        else:
+            self.failed.append(f"{shlex.join([pathlib.Path(words[0]).name, *words[1:]])}: {reason}")
+            print(f"FAILED {self.failed[-1]}", file=sys.stderr)
+        return output, None
 
     def machine(self):
         """Cores, processor, memory and versions; nothing that names the machine."""

@@ -29,13 +29,15 @@ def page(figures, run, plots):
         "of a table says how far the two results agree.", "",
         f"Machine: {run.machine()}.", "", *quick,
     ]  # fmt: skip
-    if run.skipped:
-        lines += ["Skipped:", "", *[f"- {reason}" for reason in run.skipped], ""]
+    for heading, reasons in (("Skipped:", run.skipped), ("Failed:", run.failed)):
+        if reasons:
+            lines += [heading, "", *[f"- {reason}" for reason in reasons], ""]
     lines += matching(figures, plots)
     for name, stage in stages.BENCHES.items():
         chosen = [figure for figure in figures if figure["bench"] == name]
         if chosen:
-            lines += [f"## {stage.title}", "", stage.about, "", f"`cargo bench --workspace --bench {name}`", ""]
+            peer = f", `runtime/benches/peers/{name}.py`" if stage.peer else ""
+            lines += [f"## {stage.title}", "", stage.about, "", f"`cargo bench --workspace --bench {name}`{peer}", ""]
             lines += comparison(chosen) + [""] + picture(plots, name, f"{stage.title} over the number of vertices")
     return lines[:-1] if lines[-1] == "" else lines
 

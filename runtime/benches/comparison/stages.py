@@ -15,6 +15,11 @@ class Stage:
     #: The largest case that is also measured on one thread alone; 0 where the bench sets the threads itself.
     one_thread: int
 
+    @property
+    def exports(self):
+        """Whether something else goes on with what the bench wrote: the peer, or `fmnet-infer match`."""
+        return self.peer or self is BENCHES["mesh"]
+
 
 BENCHES = {
     "mesh": Stage(
@@ -60,8 +65,8 @@ BENCHES = {
     ),
 }  # fmt: skip
 
-#: In the order of the page.
-NAMES = ("match", *BENCHES)
+#: What can be asked for, in the order of the page; the shapes that are matched come from the bench "mesh".
+NAMES = ("match", *(name for name in BENCHES if name != "mesh"))
 
 
 def measure(run, name, folder):
@@ -84,15 +89,15 @@ def measure(run, name, folder):
 
 
 def bench(run, name, threads, limits, folder):
-    command = [run.program(name), "--json", *limits, *(["--export", folder] if BENCHES[name].peer else [])]
+    command = [run.program(name), "--json", *limits, *(["--export", folder] if BENCHES[name].exports else [])]
     variables = {"RAYON_NUM_THREADS": threads}
     # Files that are at hand on some machines would make the pages of two machines differ.
-    output, cost = run.execute(command, variables | {"FMNET_DATA": "none"})
-    return [] if output is None else [json.loads(line) for line in output.splitlines()]
+    output, _ = run.execute(command, variables | {"FMNET_DATA": "none"})
+    return [json.loads(line) for line in output.splitlines()]
 
 
 def peer(run, name, threads, limits, folder):
     script = f"runtime/benches/peers/{name}.py"
     variables = {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
     output, _ = run.execute([run.python, script, folder, *limits], variables)
-    return [] if output is None else [{"bench": name, **json.loads(line)} for line in output.splitlines()]
+    return [{"bench": name, **json.loads(line)} for line in output.splitlines()]

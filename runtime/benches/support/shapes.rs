@@ -26,7 +26,7 @@ pub(crate) fn bodies(n: usize) -> [Mesh; 2] {
     let pair = demo_pair(Species::Man, 0);
     let mut seed = 0;
     [pair.source.mesh, pair.target.mesh].map(|mut mesh| {
-        while mesh.n_vertices() < 2 * n {
+        while 4 * mesh.n_vertices() < 5 * n {
             mesh = shapes::subdivide(&mesh);
         }
         seed += 1;
