@@ -15,6 +15,7 @@ data. On 2 cores it takes about 20 minutes; nothing else should run meanwhile.
 
 import argparse
 import pathlib
+import signal
 import sys
 import tempfile
 import time
@@ -50,6 +51,8 @@ def arguments():
 
 def main():
     chosen = arguments()
+    # So that the child is stopped and the temporary files go away.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     started = time.monotonic()
     run = environment.Run(ROOT, chosen.quick, chosen.dry_run)
     run.build()

@@ -104,7 +104,11 @@ class Run:
             words = [str(word) for word in command]
             start = time.perf_counter()
             child = subprocess.Popen(words, cwd=self.root, stdout=out, stderr=err, env=environment)
-            _, status, usage = os.wait4(child.pid, 0)
+            try:
+                _, status, usage = os.wait4(child.pid, 0)
+            except BaseException:
+                child.kill()
+                raise
             seconds = time.perf_counter() - start
             child.returncode = os.waitstatus_to_exitcode(status)
             out.seek(0)

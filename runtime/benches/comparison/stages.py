@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+from typing import Optional
 
 
 @dataclasses.dataclass(frozen=True)
@@ -14,6 +15,8 @@ class Stage:
     peer: bool
     #: The largest case that is also measured on one thread alone; 0 where the bench sets the threads itself.
     one_thread: int
+    #: Larger cases take minutes and say nothing new.
+    largest: Optional[int] = None
 
     @property
     def exports(self):
@@ -53,7 +56,7 @@ BENCHES = {
         "Geodesic distances",
         "One thread. Exact: one source, the fastest of several. All pairs: seconds of building the solver, and of one source times the "
         "number of vertices, against approximate methods, whose mean error relative to the exact distances is told.",
-        True, 0,
+        True, 0, largest=20_000,
     ),
     "upscale": Stage(
         "Upscaling", "A body subdivided twice and a bent copy, decimated, 30 % of the matches wrong. No peer.", False, 0,
@@ -72,7 +75,7 @@ NAMES = ("match", *(name for name in BENCHES if name != "mesh"))
 def measure(run, name, folder):
     """Figures of the bench and of its peer."""
     stage = BENCHES[name]
-    plan = [(str(run.cores), None)]
+    plan = [(str(run.cores), stage.largest)]
     if stage.one_thread and run.cores > 1:
         plan.insert(0, ("1", stage.one_thread))
     if name == "shot" and run.quick:
