@@ -163,7 +163,7 @@ def bench_lines(figures, name):
             kind = "k to 200" if name == "eigen" else what(ours).split(", ")[-1]
             if name == "eigen" and ours["k"] > 200:
                 continue
-            line = lines.setdefault(f"{figure.get('peer', 'fmnet')}, {kind}", {})
+            line = lines.setdefault(f"{figure.get('peer', 'fmnet').split(', ten')[0]}, {kind}", {})
             n = ours["vertices"]
             # Of several k at one size the smallest.
             line[n] = min(figure["seconds"], line.get(n, float("inf")))
