@@ -70,6 +70,7 @@ fn shortened(program: &str, command: &str) -> &'static [&'static str] {
             "--decimate",
             "1500",
         ],
+        ("python", script) if script.ends_with("compare.py") => &["--dry-run"],
         _ => &[],
     }
 }
@@ -203,6 +204,7 @@ fn every_option_that_a_page_names_exists() {
         "features",
         "no-default-features",
         "no-deps",
+        "quick",
     ];
     known.extend(others.into_iter().chain(["meshes", "corres", "nocapture", "open"]).map(str::to_string));
     for page in pages() {

@@ -1,73 +1,122 @@
-//! Milliseconds of the functional map solves and of the refinements, on generated shapes.
+//! Milliseconds of the functional map solves, of reading the point map off and of the refinements.
 //!
-//! `cargo bench --bench fmap`; `RAYON_NUM_THREADS` sets the threads.
+//! Two generated people of 6890 vertices, their learned descriptors, 200 eigenfunctions. `cargo bench --workspace --bench fmap`;
+//! options of every bench (`-- --help`); `RAYON_NUM_THREADS` sets the threads. `benches/peers/fmap.py` does the same in NumPy and
+//! pyFM on what `--export` wrote.
 
-use fmnet::Matrix;
-use fmnet::fmap::{FmapSolver, functional_map, functional_map_of};
+mod support;
+
+use fmnet::descriptor::{ShotOptions, shot};
+use fmnet::fmap::{FmapSolver, functional_map};
+use fmnet::io::{IoError, write_matrix, write_vector};
+use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet::point_map::{PointMap, recover};
 use fmnet::refine::{IcpOptions, ZoomOutOptions, ZoomOutSamples, icp, zoomout};
-use fmnet::spectral::Eigenbasis;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use std::time::Instant;
+use fmnet::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
+use fmnet::{Matrix, Mesh};
+use std::path::Path;
+use support::report::{Report, least};
+use support::shapes::bodies;
 
-/// Descriptors, as many as SHOT has bins.
-const DESCRIPTORS: usize = 352;
+const VERTICES: usize = 6890;
+const K: usize = 200;
+/// Eigenfunctions of the map that is read off and refined.
+const K_MAP: usize = 120;
 
 fn main() {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for k in [70, 120, 200] {
-        let basis = rectangle(65, 106, k);
-        let mut random = || Matrix::from_fn(k, DESCRIPTORS, |_, _| rng.random_range(-1.0..1.0));
-        let (f, g) = (random(), random());
-        let solve = |solver| functional_map(&basis, &basis, &f, &g, solver).expect("a finite system");
-        time(&format!("least squares, k = {k}"), 5, || solve(FmapSolver::LeastSquares));
+    let report = Report::from_arguments("fmap");
+    let [(basis_source, f_hat), (basis_target, g_hat)] = described(bodies(VERTICES));
+    let bases = [&basis_source, &basis_target];
+    let inputs = [("source", &basis_source, &f_hat), ("target", &basis_target, &g_hat)];
+    report.export("fmap", |folder| {
+        inputs.into_iter().try_for_each(|(name, basis, hat)| write_basis(folder, name, basis, hat))
+    });
+    for k in [70, K_MAP, K] {
+        solve(&report, "least-squares", k, FmapSolver::LeastSquares, bases, [&f_hat, &g_hat]);
         let regularized = FmapSolver::Regularized { weight: FmapSolver::DEFAULT_MASK_WEIGHT };
-        time(&format!("regularised, k = {k}"), 5, || solve(regularized));
+        solve(&report, "regularised", k, regularized, bases, [&f_hat, &g_hat]);
     }
-    let basis = rectangle(65, 106, 200);
-    let n = basis.n();
-    let map = PointMap::new((0..n as u32).collect(), n);
-    let truncated = basis.truncated(120);
-    let c = functional_map_of(&map, &truncated, &truncated).expect("a map of the shape");
-    time("recover, n = 6890, k = 120", 3, || {
-        recover(&c, &truncated, &truncated).expect("a map of the shape")
-    });
-    let icp_options = IcpOptions { max_iterations: 3 };
-    time("icp, 3 rounds", 1, || icp(&c, &truncated, &truncated, &icp_options).expect("a map of the shape"));
-    for samples in [ZoomOutSamples::All, ZoomOutSamples::Farthest(1000)] {
-        let options = ZoomOutOptions { samples, ..ZoomOutOptions::default() };
-        let name = format!("zoomout 30 to 200, {samples:?}");
-        time(&name, 1, || zoomout(&map, &basis, &basis, &options).expect("a map of the shape"));
+    refine(&report, bases, [&f_hat, &g_hat]);
+}
+
+/// The bases at unit area and the coefficients of the learned descriptors, `[k, 352]`.
+fn described(meshes: [Mesh; 2]) -> [(Eigenbasis, Matrix); 2] {
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/bodies/model.onnx");
+    let network = DescriptorNetwork::load(&model, Backend::Tract).expect("the built-in model");
+    meshes.map(|mesh| {
+        let (basis, _) =
+            eigenbasis(&Laplacian::new(&mesh), K, &EigenOptions::default()).expect("a clean mesh");
+        let (shot, _) = shot(&mesh, &ShotOptions::default()).expect("a mesh with an area");
+        let descriptors = network.descriptors(&shot).expect("rows of the right width");
+        let basis = basis.at_unit_area(K);
+        let coefficients = basis.project(&descriptors);
+        (basis, coefficients)
+    })
+}
+
+/// The first `k` rows.
+fn first(coefficients: &Matrix, k: usize) -> Matrix {
+    Matrix::from_fn(k, coefficients.cols(), |i, j| coefficients[(i, j)])
+}
+
+fn solve(
+    report: &Report,
+    name: &str,
+    k: usize,
+    solver: FmapSolver,
+    bases: [&Eigenbasis; 2],
+    hats: [&Matrix; 2],
+) -> Matrix {
+    let [basis_source, basis_target] = bases.map(|basis| basis.truncated(k));
+    let [f_hat, g_hat] = hats.map(|hat| first(hat, k));
+    let run =
+        || functional_map(&basis_source, &basis_target, &f_hat, &g_hat, solver).expect("a finite system");
+    let (cost, (c, _)) = least(report.runs(5), run);
+    tell(report, &format!("{name}-{k}"), cost);
+    report.export("fmap", |folder| write_matrix(&folder.join(format!("{name}-{k}.npy")), &c));
+    c
+}
+
+fn refine(report: &Report, bases: [&Eigenbasis; 2], hats: [&Matrix; 2]) {
+    let solver = FmapSolver::Regularized { weight: FmapSolver::DEFAULT_MASK_WEIGHT };
+    let [source, target] = bases.map(|basis| basis.truncated(K_MAP));
+    let [f_hat, g_hat] = hats.map(|hat| first(hat, K_MAP));
+    let (c, _) = functional_map(&source, &target, &f_hat, &g_hat, solver).expect("a finite system");
+    let (cost, map) = least(report.runs(5), || recover(&c, &source, &target).expect("a map of the shapes"));
+    tell(report, "point-map", cost);
+    report.export("fmap", |folder| write_targets(&folder.join("point-map.npy"), &map));
+    let rounds = IcpOptions { max_iterations: 3 };
+    let (cost, _) =
+        least(report.runs(3), || icp(&c, &source, &target, &rounds).expect("a map of the shapes"));
+    tell(report, "icp-3-rounds", cost);
+    let paper = ZoomOutOptions { both_ways: false, ..ZoomOutOptions::default() };
+    let samples = ZoomOutOptions { samples: ZoomOutSamples::Farthest(1000), ..paper.clone() };
+    for (name, options) in [
+        ("zoomout", paper),
+        ("zoomout-1000-samples", samples),
+        ("zoomout-both-ways", ZoomOutOptions::default()),
+    ] {
+        let run = || zoomout(&map, bases[0], bases[1], &options).expect("a map of the shapes").map;
+        let (cost, refined) = least(report.runs(3), run);
+        tell(report, name, cost);
+        report.export("fmap", |folder| write_targets(&folder.join(format!("{name}.npy")), &refined));
     }
 }
 
-fn time<T>(name: &str, repetitions: usize, mut run: impl FnMut() -> T) {
-    let mut best = f64::INFINITY;
-    for _ in 0..repetitions {
-        let start = Instant::now();
-        std::hint::black_box(run());
-        best = best.min(start.elapsed().as_secs_f64());
-    }
-    println!("{name:<36} {:>9.2} ms", 1e3 * best);
+fn tell(report: &Report, name: &str, cost: support::report::Cost) {
+    let mut figures = cost.figures();
+    figures["vertices"] = VERTICES.into();
+    report.figure(&format!("{name:<24} {:>9.2} ms", 1e3 * cost.seconds), &format!("fmap-{name}"), figures);
 }
 
-/// The first `k` Neumann eigenfunctions of a rectangle at the centres of `nx` x `ny` cells.
-fn rectangle(nx: usize, ny: usize, k: usize) -> Eigenbasis {
-    let wave = |order: usize| std::f64::consts::PI * order as f64;
-    let norm = |order: usize| if order == 0 { 1.0 } else { 2f64.sqrt() };
-    let height = ny as f64 / nx as f64;
-    let mut modes: Vec<(f64, usize, usize)> = (0..nx * ny)
-        .map(|m| (m % nx, m / nx))
-        .map(|(a, b)| (wave(a).powi(2) + (wave(b) / height).powi(2), a, b))
-        .collect();
-    modes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let eigenvectors = Matrix::from_fn(nx * ny, k, |vertex, j| {
-        let (_, a, b) = modes[j];
-        let (u, v) = ((vertex % nx) as f64 + 0.5, (vertex / nx) as f64 + 0.5);
-        let value = (wave(a) * u / nx as f64).cos() * (wave(b) * v / ny as f64).cos();
-        value * norm(a) * norm(b) / height.sqrt()
-    });
-    let eigenvalues = modes[..k].iter().map(|mode| mode.0).collect();
-    Eigenbasis { eigenvalues, eigenvectors, mass: vec![height / (nx * ny) as f64; nx * ny] }
+fn write_basis(folder: &Path, name: &str, basis: &Eigenbasis, coefficients: &Matrix) -> Result<(), IoError> {
+    let file = |what: &str| folder.join(format!("{name}-{what}.npy"));
+    write_vector(&file("eigenvalues"), &basis.eigenvalues)?;
+    write_matrix(&file("eigenvectors"), &basis.eigenvectors)?;
+    write_vector(&file("mass"), &basis.mass)?;
+    write_matrix(&file("coefficients"), coefficients)
+}
+
+fn write_targets(path: &Path, map: &PointMap) -> Result<(), IoError> {
+    write_vector(path, &map.targets.iter().map(|&target| target as i32).collect::<Vec<_>>())
 }

@@ -1,29 +1,36 @@
 //! Seconds of the exact nearest neighbour search between two spectral embeddings, from 1K to 200K points.
 //!
 //! The embeddings are those of a long rectangle, sampled at random, moved by a functional map with as much
-//! noise as signal. Peers to compare with: a matrix product of the two embeddings and the row-wise minimum,
-//! in NumPy.
+//! noise as signal. `benches/peers/nearest.py` times a matrix product with the row-wise minimum in NumPy, and SciPy's kd-tree.
 //!
-//! `cargo bench --bench nearest -- [n ...]`; `RAYON_NUM_THREADS` sets the threads.
+//! `cargo bench --workspace --bench nearest -- [n ...]`, and the options of every bench (`-- --help`); `RAYON_NUM_THREADS` sets the
+//! threads.
+
+mod support;
 
 use fmnet::Matrix;
+use fmnet::io::{write_matrix, write_vector};
 use fmnet::point_map::search::NearestRows;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::time::Instant;
+use support::report::{Report, least, measured};
+
+/// A brute force takes the same time whatever the noise; of larger embeddings only the noisy ones are exported.
+const EXPORT_BOTH: usize = 20_000;
 
 fn main() {
-    let asked: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let report = Report::from_arguments("nearest");
+    let asked: Vec<usize> = report.words.iter().filter_map(|word| word.parse().ok()).collect();
     let sizes = if asked.is_empty() { vec![1000, 6890, 25_000, 200_000] } else { asked };
-    println!("{:>8} {:>4} {:>6} {:>10} {:>10}", "n", "k", "noise", "prepare s", "search s");
-    for n in sizes {
+    report.say(&format!("{:>8} {:>4} {:>6} {:>10} {:>10}", "n", "k", "noise", "prepare s", "search s"));
+    for n in sizes.into_iter().filter(|&n| report.includes(n)) {
         for noise in [0.0, 1.0] {
-            measure(n, if n < 20_000 { 120 } else { 100 }, noise);
+            measure(&report, n, if n < 20_000 { 120 } else { 100 }, noise);
         }
     }
 }
 
-fn measure(n: usize, k: usize, noise: f64) {
+fn measure(report: &Report, n: usize, k: usize, noise: f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let targets = embedding(n, k, &mut rng);
     let source = embedding(n, k, &mut rng);
@@ -35,17 +42,29 @@ fn measure(n: usize, k: usize, noise: f64) {
             *x += disturbance.row(t).iter().zip(source.row(i)).map(|(c, x)| c * x).sum::<f64>();
         }
     }
-    let (mut prepare, mut search) = (f64::INFINITY, f64::INFINITY);
-    for _ in 0..if n < 50_000 { 5 } else { 1 } {
-        let start = Instant::now();
-        let tree = NearestRows::new(&targets).expect("targets are finite");
-        prepare = prepare.min(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        let found = tree.nearest(&queries).expect("queries are finite");
-        search = search.min(start.elapsed().as_secs_f64());
-        assert_eq!(found.index.len(), n);
+    drop(source);
+    let run = || {
+        let (prepare, tree) = measured(|| NearestRows::new(&targets).expect("targets are finite"));
+        (prepare.seconds, tree.nearest(&queries).expect("queries are finite"))
+    };
+    let (cost, (prepare, found)) = least(report.runs(if n < 50_000 { 5 } else { 1 }), run);
+    assert_eq!(found.index.len(), n);
+    let case = format!("nearest-{n}-{k}-{noise}");
+    let line = format!("{n:>8} {k:>4} {noise:>6} {prepare:>10.4} {:>10.4}", cost.seconds - prepare);
+    let mut figures = cost.figures();
+    figures["vertices"] = n.into();
+    figures["k"] = k.into();
+    figures["noise"] = noise.into();
+    figures["prepare_seconds"] = prepare.into();
+    report.figure(&line, &case, figures);
+    if n <= EXPORT_BOTH || noise > 0.0 {
+        let index: Vec<i32> = found.index.iter().map(|&i| i as i32).collect();
+        report.export(&case, |folder| {
+            write_matrix(&folder.join("targets.npy"), &targets)?;
+            write_matrix(&folder.join("queries.npy"), &queries)?;
+            write_vector(&folder.join("index.npy"), &index)
+        });
     }
-    println!("{n:>8} {k:>4} {noise:>6} {prepare:>10.4} {search:>10.4}");
 }
 
 /// The first `k` Neumann eigenfunctions of a 1 x 6 rectangle at `n` random points, `[n, k]`.

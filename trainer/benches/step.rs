@@ -1,7 +1,10 @@
 //! Seconds of a training step (TARGETS.md): one pair, 7 blocks of width 352, k = 120, on 1 and 2 threads.
 //!
-//! `cargo bench -p fmnet-trainer --bench step`; prints the least and the median seconds of several steps and, on Linux, the
-//! least CPU seconds, which tell more on a busy machine.
+//! `cargo bench --workspace --bench step`; prints the least and the median seconds of several steps and, on Linux, the
+//! least CPU seconds, which tell more on a busy machine. Options of every bench: `-- --help`.
+
+#[path = "../../runtime/benches/support/report.rs"]
+mod report;
 
 use candle_core::Device;
 use fmnet::Matrix;
@@ -10,7 +13,8 @@ use fmnet_trainer::network::{Network, NetworkOptions};
 use fmnet_trainer::step::{PairBatch, ShapeBatch, StepOptions, StepRunner};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::time::Instant;
+use report::{Report, measured};
+use serde_json::json;
 
 const K: usize = 120;
 const STEPS: usize = 8;
@@ -27,16 +31,16 @@ fn shape(points: usize, generator: &mut ChaCha8Rng, both_directions: bool) -> Sh
     }
 }
 
-/// CPU seconds of all threads so far; 0 where the system does not say.
-fn cpu_seconds() -> f64 {
-    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
-    let nanoseconds = |task: std::fs::DirEntry| -> Option<f64> {
-        std::fs::read_to_string(task.path().join("schedstat")).ok()?.split(' ').next()?.parse().ok()
-    };
-    tasks.flatten().filter_map(nanoseconds).sum::<f64>() * 1e-9
+/// What is optimised.
+struct Setting {
+    name: &'static str,
+    points: usize,
+    solver: FmSolver,
+    both_directions: bool,
 }
 
-fn run(name: &str, points: usize, solver: FmSolver, both_directions: bool, threads: usize) {
+fn run(report: &Report, setting: Setting, threads: usize) {
+    let Setting { name, points, solver, both_directions } = setting;
     let mut generator = ChaCha8Rng::seed_from_u64(1);
     let source = shape(points, &mut generator, both_directions);
     let target = shape(points, &mut generator, true);
@@ -45,30 +49,40 @@ fn run(name: &str, points: usize, solver: FmSolver, both_directions: bool, threa
         Network::new(NetworkOptions::default(), &Device::Cpu).expect("the default network is valid");
     let options = StepOptions { functional_map: solver, ..StepOptions::default() };
     let mut runner = StepRunner::new(network, options).expect("the optimiser fits its network");
-    let mut step = || {
-        let (start, cpu) = (Instant::now(), cpu_seconds());
-        runner.step(&pairs, 1e-3).expect("a step on random data succeeds");
-        (start.elapsed().as_secs_f64(), cpu_seconds() - cpu)
-    };
+    let mut step = || measured(|| runner.step(&pairs, 1e-3).expect("a step on random data succeeds")).0;
     step();
-    let (mut seconds, cpu): (Vec<f64>, Vec<f64>) = (0..STEPS).map(|_| step()).unzip();
-    seconds.sort_by(f64::total_cmp);
-    let cpu = cpu.into_iter().fold(f64::INFINITY, f64::min);
-    println!(
-        "{name}, {points} points, {threads} threads: {:.3} s, median {:.3} s, CPU {cpu:.3} s",
-        seconds[0],
-        seconds[STEPS / 2]
+    let costs: Vec<_> = (0..report.runs(STEPS)).map(|_| step()).collect();
+    let sorted = |of: fn(&report::Cost) -> f64| {
+        let mut values: Vec<f64> = costs.iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let (seconds, cpu) = (sorted(|cost| cost.seconds), sorted(|cost| cost.cpu_seconds)[0]);
+    let (least, median) = (seconds[0], seconds[seconds.len() / 2]);
+    let peak_mb = sorted(|cost| cost.peak_mb)[costs.len() - 1];
+    let line = format!(
+        "{name}, {points} points, {threads} threads: {least:.3} s, median {median:.3} s, CPU {cpu:.3} s"
     );
+    let figures = json!({
+        "points": points, "k": K, "threads": threads, "seconds": least, "median_seconds": median, "cpu_seconds": cpu,
+        "peak_mb": peak_mb,
+    });
+    report.figure(&line, &format!("step-{name}"), figures);
 }
 
 fn main() {
+    let report = Report::from_arguments("step");
     for threads in [1, 2] {
         let pool =
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| {
-            run("least squares", 1500, FmSolver::least_squares(), false, threads);
-            run("regularised", 1000, FmSolver::regularized(), false, threads);
-            run("regularised, both directions", 1000, FmSolver::regularized(), true, threads);
+            for (name, points, solver, both_directions) in [
+                ("least squares", 1500, FmSolver::least_squares(), false),
+                ("regularised", 1000, FmSolver::regularized(), false),
+                ("regularised, both directions", 1000, FmSolver::regularized(), true),
+            ] {
+                run(&report, Setting { name, points, solver, both_directions }, threads);
+            }
         });
     }
 }

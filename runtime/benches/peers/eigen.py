@@ -1,27 +1,17 @@
-"""Times scipy's eigsh in shift-invert mode on the meshes that `cargo bench --bench eigen -- --export DIR` wrote.
+"""Times scipy's eigsh in shift-invert mode on what `cargo bench --workspace --bench eigen -- --export DIR` wrote.
 
-    OPENBLAS_NUM_THREADS=1 python benches/peers/eigen.py DIR [--largest N]
-
-Prints wall and processor seconds of eigsh alone (the least of several runs) and the largest relative difference between
-its eigenvalues and ours. `--largest` leaves bigger meshes out.
+    OMP_NUM_THREADS=1 python benches/peers/eigen.py DIR
 """
 
-import argparse
-import pathlib
-import resource
-import time
-
+import common
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
 
-
-def read_off(path):
-    numbers = np.array(path.read_text().split()[1:], dtype=float)
-    n, m = int(numbers[0]), int(numbers[1])
-    vertices = numbers[3 : 3 + 3 * n].reshape(n, 3)
-    faces = numbers[3 + 3 * n :].reshape(m, 4)[:, 1:].astype(int)
-    return vertices, faces
+#: Relative difference of eigenvalues that counts as agreement.
+TOLERANCE = 1e-6
+#: Nobody asks scipy for more.
+MOST_PAIRS = 200
 
 
 def laplacian(vertices, faces):
@@ -44,28 +34,21 @@ def laplacian(vertices, faces):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=pathlib.Path)
-    parser.add_argument("--largest", type=int, default=10**9)
-    arguments = parser.parse_args()
-    print("vertices    k   eigsh s     cpu s   difference")
-    cases = sorted(arguments.folder.glob("eigen_*.off"), key=lambda p: [int(x) for x in p.stem.split("_")[1:]])
-    for path in cases:
-        n, k = (int(x) for x in path.stem.split("_")[1:])
-        if n > arguments.largest:
+    arguments = common.options(__doc__)
+    for folder, (n, k) in common.cases(arguments.folder, "eigen"):
+        n, k = int(n), int(k)
+        if n > arguments.largest or k > MOST_PAIRS:
             continue
-        stiffness, mass = laplacian(*read_off(path))
-        ours = np.loadtxt(path.with_suffix(".txt"))
-        area = mass.sum()
-        wall, cpu = [], []
-        for _ in range(3 if n < 20_000 else 1):
-            start, used = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_utime
-            values, _ = eigsh(stiffness, k, sp.diags(mass).tocsc(), sigma=-1e-2 / area, which="LM")
-            wall.append(time.perf_counter() - start)
-            cpu.append(resource.getrusage(resource.RUSAGE_SELF).ru_utime - used)
-        values = np.sort(values)
-        difference = np.abs(values - ours)[1:] / values[1:]
-        print(f"{n:8} {k:4} {min(wall):9.3f} {min(cpu):9.3f} {difference.max():12.1e}", flush=True)
+        stiffness, mass = laplacian(common.load(folder, "vertices"), common.load(folder, "faces"))
+        shift = -1e-2 / mass.sum()
+        runs = 3 if n < 20_000 and not arguments.quick else 1
+        cost, (values, _) = common.least(
+            runs, lambda: eigsh(stiffness, k, sp.diags(mass).tocsc(), sigma=shift, which="LM")
+        )
+        values, ours = np.sort(values), common.load(folder, "eigenvalues")
+        difference = (np.abs(values - ours)[1:] / values[1:]).max()
+        text = f"eigenvalues within {difference:.0e}"
+        common.tell(folder.name, "scipy eigsh", cost, text, difference < TOLERANCE)
 
 
 if __name__ == "__main__":
