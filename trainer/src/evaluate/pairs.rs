@@ -83,7 +83,7 @@ mod tests {
     use crate::dataset::{Correspondence, ShapeEntry};
 
     fn dataset() -> Dataset {
-        let shape = |name: &str, group: &str, split, partial| ShapeEntry {
+        let shape = |name: &str, group: &str, split, partial: bool| ShapeEntry {
             name: name.into(),
             mesh: PathBuf::from(name),
             group: group.into(),

@@ -3,7 +3,7 @@
 use crate::args::{Common, TrainArgs};
 use crate::interrupt;
 use crate::progress::Progress;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use candle_core::Device;
 use fmnet_trainer::config::TrainConfig;
 use fmnet_trainer::train::train;
@@ -38,9 +38,12 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
 /// The first GPU, or the CPU.
 pub(super) fn device(cuda: bool) -> Result<Device> {
     match cuda {
-        true => {
-            Device::new_cuda(0).context("no CUDA device; build with `--features cuda`, or leave --cuda out")
+        true if cfg!(not(feature = "cuda")) => {
+            bail!("this program was built without the feature `cuda`; see trainer/build-cuda.sh, or leave --cuda out")
         }
+        true => Device::new_cuda(0).context(
+            "no NVIDIA GPU can be used; check the driver with nvidia-smi, or leave --cuda out to train on the CPU",
+        ),
         false => Ok(Device::Cpu),
     }
 }
