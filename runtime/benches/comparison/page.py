@@ -29,6 +29,9 @@ def page(figures, run, plots):
         "of a table says how far the two results agree.", "",
         f"Machine: {run.machine()}.", "", *quick,
     ]  # fmt: skip
+    left_out = [name for name in stages.NAMES if all(figure["bench"] != name for figure in figures)]
+    if left_out:
+        lines += [f"Left out of this run (`--only`): {', '.join(left_out)}.", ""]
     for heading, reasons in (("Skipped:", run.skipped), ("Failed:", run.failed)):
         if reasons:
             lines += [heading, "", *[f"- {reason}" for reason in reasons], ""]
