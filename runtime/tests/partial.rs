@@ -16,7 +16,7 @@ fn cut(mesh: &Mesh, axis: usize) -> Mesh {
     let limit = highest - 0.2 * (highest - lowest);
     let faces = mesh.faces().iter().copied();
     let kept = faces.filter(|face| face.iter().all(|&i| mesh.vertices()[i as usize][axis] < limit));
-    Mesh::new(mesh.vertices().to_vec(), kept.collect()).unwrap()
+    Mesh::new(mesh.vertices().to_vec(), kept.collect()).expect("faces of a valid mesh")
 }
 
 /// The axis along which a body is longest.
@@ -25,7 +25,7 @@ fn long_axis(mesh: &Mesh) -> usize {
         let heights = || mesh.vertices().iter().map(|p| p[axis]);
         heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min)
     };
-    (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).unwrap()
+    (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).expect("three axes")
 }
 
 #[test]

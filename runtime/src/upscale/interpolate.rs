@@ -10,8 +10,11 @@ const NEAR: usize = 12;
 /// The kernel is as wide as the distance to the match of this rank, from 0: a few matches share in a residual, so that it does not jump where
 /// the decimated target is coarse.
 const WIDTH_RANK: usize = 3;
-/// A match is taken to be wrong where the functional map misses it by more than this many times the median.
-const OUTLIER: f64 = 3.0;
+/// A match is taken to be wrong where the functional map misses it by more than this many times what it misses at
+/// [`RIGHT`] of the matches.
+const OUTLIER: f64 = 5.0;
+/// A share of the matches that are right for sure; low, so that wrong ones hardly change what is usual among them.
+const RIGHT: f64 = 0.35;
 
 /// `C phi(x)` at every vertex of the source plus the residual `psi(y_j) - C phi(x_j)` of the matches near it, `[n, k_target]`.
 ///
@@ -35,7 +38,8 @@ pub(super) fn add_residuals(
         .collect();
     let mut sorted = missed.clone();
     sorted.sort_unstable_by(f64::total_cmp);
-    let limit = OUTLIER * sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let usual = sorted.get((RIGHT * sorted.len() as f64) as usize).copied().unwrap_or(0.0);
+    let limit = OUTLIER * usual;
     let trusted: Vec<(u32, u32)> =
         matches.iter().zip(&missed).filter(|(_, missed)| **missed <= limit).map(|(pair, _)| *pair).collect();
     if trusted.is_empty() {
