@@ -206,6 +206,7 @@ fn every_option_that_a_page_names_exists() {
         "no-deps",
         "quick",
         "only",
+        "subdivisions",
     ];
     known.extend(others.into_iter().chain(["meshes", "corres", "nocapture", "open"]).map(str::to_string));
     for page in pages() {
