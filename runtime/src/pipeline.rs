@@ -17,7 +17,7 @@ use crate::fmap::{FmapInfo, FmapSolver, functional_map};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
 use crate::point_map::{Comparison, PointMap, recover_by};
-use crate::refine::{IcpOptions, PmfHints, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
+use crate::refine::{IcpOptions, PmfHints, PmfInfo, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::upscale::{
@@ -51,8 +51,11 @@ pub enum Refinement {
     #[default]
     Zoomout,
     /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
-    /// meshes of equally many vertices, injective where the source has fewer.
+    /// meshes of equally many vertices, injective where the source has fewer. Where both meshes turn out to be triangulated
+    /// alike, as registrations of one template are, the map then follows the triangulation and is exact.
     Pmf,
+    /// The same by geometry alone: for measuring what the filter does, where the meshes are triangulated alike.
+    PmfGeometry,
 }
 
 /// How the map of decimated meshes becomes one of the full meshes.
@@ -129,6 +132,8 @@ pub struct Match {
     pub functional_map: Matrix,
     /// How its solution went.
     pub functional_map_info: FmapInfo,
+    /// How the product manifold filter went, where it ran.
+    pub pmf_info: Option<PmfInfo>,
     /// How the upscaling went, where there was one.
     pub upscale_info: Option<AdmmInfo>,
 }
@@ -170,7 +175,7 @@ impl Matcher {
         let refinement = options.refinement.unwrap_or(default_refinement);
         shape_options.k = match refinement {
             Refinement::None | Refinement::Icp => k,
-            Refinement::Zoomout | Refinement::Pmf => k.max(REFINED_K),
+            Refinement::Zoomout | Refinement::Pmf | Refinement::PmfGeometry => k.max(REFINED_K),
         };
         let default_solver =
             network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver.for_matching());
@@ -286,11 +291,11 @@ impl Matcher {
         let raw = timed(observer, &pair, "point map", || {
             recover_by(Comparison::suiting(solver), &functional_map, &basis_source, &basis_target)
         })?;
-        let map = self.refine(source, target, &functional_map, raw, &pair, observer)?;
+        let (map, pmf_info) = self.refine(source, target, &functional_map, raw, &pair, observer)?;
         drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
-        Ok(Match { map, functional_map, functional_map_info, upscale_info })
+        Ok(Match { map, functional_map, functional_map_info, pmf_info, upscale_info })
     }
 
     fn refine(
@@ -301,7 +306,7 @@ impl Matcher {
         raw: PointMap,
         pair: &str,
         observer: Observer,
-    ) -> Result<PointMap, Error> {
+    ) -> Result<(PointMap, Option<PmfInfo>), Error> {
         let at_k = |described: &DescribedShape| described.shape.unit_basis(self.k);
         let whole = |described: &DescribedShape| described.shape.unit_basis(described.shape.basis.k());
         let zoomout_options =
@@ -311,28 +316,28 @@ impl Matcher {
                 zoomout(&raw, &whole(source), &whole(target), &zoomout_options)
             })
         };
-        let map = match self.refinement {
-            Refinement::None => raw,
+        Ok(match self.refinement {
+            Refinement::None => (raw, None),
             Refinement::Icp => {
                 let refine = || icp(functional_map, &at_k(source), &at_k(target), &IcpOptions::default());
-                timed(observer, pair, "icp", refine)?.map
+                (timed(observer, pair, "icp", refine)?.map, None)
             }
-            Refinement::Zoomout => by_zoomout()?.map,
-            Refinement::Pmf => {
+            Refinement::Zoomout => (by_zoomout()?.map, None),
+            Refinement::Pmf | Refinement::PmfGeometry => {
                 let start = by_zoomout()?.map;
+                let meshes = [source.shape.mesh(), target.shape.mesh()];
                 // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
                 let hints = PmfHints {
                     descriptors: Some([&source.shape.shot, &target.shape.shot]),
-                    meshes: Some([source.shape.mesh(), target.shape.mesh()]),
+                    meshes: (self.refinement == Refinement::Pmf).then_some(meshes),
                 };
                 let (basis_source, basis_target) = (whole(source), whole(target));
-                timed(observer, pair, "pmf", || {
+                let filtered = timed(observer, pair, "pmf", || {
                     pmf(&start, &basis_source, &basis_target, hints, &PmfOptions::default())
-                })?
-                .map
+                })?;
+                (filtered.map, Some(filtered.info))
             }
-        };
-        Ok(map)
+        })
     }
 
     /// From the working meshes to the full ones, where they differ.

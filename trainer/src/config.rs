@@ -74,7 +74,7 @@ impl FromStr for Split {
 }
 
 macro_rules! train_config {
-    ($( $(#[doc = $doc:literal])+ $name:ident : $kind:ty = $default:expr ),* $(,)?) => {
+    ($( $(#[doc = $doc:literal])+ $name:ident $(($short:literal))? : $kind:ty = $default:expr ),* $(,)?) => {
         /// Settings of a training run, as in `--config FILE.toml`, on the command line and in the run's folder.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -91,7 +91,7 @@ macro_rules! train_config {
         /// The same settings on the command line, where each is optional and wins over the file.
         #[derive(Clone, Debug, Default, clap::Args)]
         pub struct TrainOverrides {
-            $( $(#[doc = $doc])+ #[arg(long)] pub $name: Option<$kind>, )*
+            $( $(#[doc = $doc])+ #[arg(long $(, short = $short)?)] pub $name: Option<$kind>, )*
         }
 
         impl TrainOverrides {
@@ -107,7 +107,7 @@ train_config! {
     /// Dataset folders, separated by commas (see `fmnet-train preprocess --help` for the layouts)
     dataset: List<String> = List(Vec::new()),
     /// Folder of the run: checkpoints, metrics, plot
-    out: PathBuf = PathBuf::from("runs/default"),
+    out ('o'): PathBuf = PathBuf::from("runs/default"),
     /// Folder where preprocessed shapes are kept; empty: OUT/cache
     cache: PathBuf = PathBuf::new(),
     /// Splits to train on: train, validation, test, separated by commas
@@ -121,7 +121,7 @@ train_config! {
     /// Points of each group between which geodesic distances are computed beforehand
     pool: usize = 2500,
     /// Eigenfunctions of each shape, 1 to 352
-    k: usize = 120,
+    k ('k'): usize = 120,
     /// Meshes of more vertices are decimated to so many; 0: never
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area)

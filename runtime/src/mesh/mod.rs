@@ -18,6 +18,7 @@ pub use nearest::{nearest_k_vertices, nearest_vertices};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
 pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
 pub use topology::{Adjacency, Components, Fans, NONE, Topology};
+pub(crate) use union_find::UnionFind;
 pub use validate::{ComponentSize, Found, MeshReport, inspect};
 
 use thiserror::Error;

@@ -53,9 +53,10 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
             methods: vec![
                 learned("regularised", regularized, 120, Refinement::None),
                 learned("regularised + ZoomOut", regularized, 120, Refinement::Zoomout),
-                learned("regularised + PMF", regularized, 120, Refinement::Pmf),
+                learned("regularised + PMF", regularized, 120, Refinement::PmfGeometry),
+                learned("regularised + PMF, triangulation", regularized, 120, Refinement::Pmf),
                 learned("FMNet", plain, 120, Refinement::None),
-                learned("FMNet + PMF", plain, 120, Refinement::Pmf),
+                learned("FMNet + PMF", plain, 120, Refinement::PmfGeometry),
                 learned("Siamese", siamese, 120, Refinement::None),
                 shot(120),
             ],

@@ -1,7 +1,6 @@
 //! From averages to an assignment: which targets a source vertex may take, at what gain, and what to do with the rest.
 
 use super::auction::{Gains, NONE, assign};
-use super::edges::EdgeTerm;
 use super::neighborhood::Neighborhoods;
 use crate::Matrix;
 use crate::point_map::PointMap;
@@ -26,7 +25,6 @@ pub(super) struct Assigner<'a> {
     /// The median of the squared distance of a row to its nearest other.
     squared_spacing: f64,
     descriptors: Option<DescriptorTerm<'a>>,
-    edges: Option<&'a EdgeTerm>,
 }
 
 /// The part of the gain that compares pointwise descriptors.
@@ -69,12 +67,7 @@ impl<'a> Assigner<'a> {
             squared_distance(rows.row(vertex as usize), rows.row(next as usize))
         };
         let squared_spacing = median((0..rows.rows() as u32).map(to_next).collect());
-        Self { rows, neighborhoods, candidates, squared_spacing, descriptors, edges: None }
-    }
-
-    /// The same, and edges count.
-    pub(super) fn with_edges(self, edges: &'a EdgeTerm) -> Self {
-        Self { edges: Some(edges), ..self }
+        Self { rows, neighborhoods, candidates, squared_spacing, descriptors }
     }
 
     /// Whether a source of so many vertices gets an injective map.
@@ -92,7 +85,7 @@ impl<'a> Assigner<'a> {
             if present[x] != PointMap::UNMATCHED && !vertices.contains(&present[x]) {
                 vertices.push(present[x]);
             }
-            self.gains(averages.row(x), x, &vertices, present)
+            self.gains(averages.row(x), x, &vertices)
         };
         let rows = (0..averages.rows()).into_par_iter().map(row).collect();
         let gains = Gains::from_rows(rows, self.rows.rows());
@@ -165,15 +158,14 @@ impl<'a> Assigner<'a> {
             let taken = targets.iter().filter(|&&t| t != PointMap::UNMATCHED);
             taken.for_each(|&t| is_free[t as usize] = false);
             let free: Vec<u32> = (0..is_free.len() as u32).filter(|&y| is_free[y as usize]).collect();
-            let rows =
-                open.par_iter().map(|&x| self.free_candidates(averages.row(x), x, &free, targets)).collect();
+            let rows = open.par_iter().map(|&x| self.free_candidates(averages.row(x), x, &free)).collect();
             let found = auction(&Gains::from_rows(rows, self.rows.rows()));
             open.into_iter().zip(found).for_each(|(x, target)| targets[x] = target);
         }
     }
 
-    fn free_candidates(&self, average: &[f64], x: usize, free: &[u32], present: &[u32]) -> Vec<(u32, f64)> {
-        let mut gains = self.gains(average, x, free, present);
+    fn free_candidates(&self, average: &[f64], x: usize, free: &[u32]) -> Vec<(u32, f64)> {
+        let mut gains = self.gains(average, x, free);
         if gains.len() > FREE_CANDIDATES {
             gains.select_nth_unstable_by(FREE_CANDIDATES - 1, |a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             gains.truncate(FREE_CANDIDATES);
@@ -182,13 +174,12 @@ impl<'a> Assigner<'a> {
         gains
     }
 
-    /// Minus the squared distances of embeddings, in squared spacings, and of descriptors, plus what edges gain, less that of the
-    /// best.
-    fn gains(&self, average: &[f64], x: usize, candidates: &[u32], present: &[u32]) -> Vec<(u32, f64)> {
+    /// Minus the squared distances of embeddings, in squared spacings, and of descriptors, less that of the best.
+    fn gains(&self, average: &[f64], x: usize, candidates: &[u32]) -> Vec<(u32, f64)> {
         let gain = |&y: &u32| {
             let distance = squared_distance(average, self.rows.row(y as usize)) / self.squared_spacing;
             let unlike = self.descriptors.as_ref().map_or(0.0, |term| term.cost(x, y));
-            (y, self.edges.map_or(0.0, |edges| edges.gain(x, y, present)) - distance - unlike)
+            (y, -distance - unlike)
         };
         let mut gains: Vec<(u32, f64)> = candidates.iter().map(gain).collect();
         let best = gains.iter().map(|entry| entry.1).fold(f64::NEG_INFINITY, f64::max);

@@ -12,14 +12,16 @@
 //! only the targets nearest to the average take part in the assignment, so that no multiscale scheme is needed; and the last
 //! rounds can average by an affine fit in the tangent plane instead of a positive kernel, which is not drawn towards
 //! densely sampled or shrunk regions and leaves a correct map as it is.
+//!
+//! Where the meshes are given and turn out to be triangulated alike, the map follows the triangulation in the end.
 
 mod assignment;
 mod auction;
-mod edges;
 mod neighborhood;
 mod smooth;
 #[cfg(test)]
 mod tests;
+mod triangulation;
 
 use super::{RefineError, Refined};
 use crate::fmap::functional_map_of;
@@ -27,12 +29,9 @@ use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
 use crate::{Matrix, Mesh};
 use assignment::{Assigner, DescriptorTerm};
-use edges::EdgeTerm;
 use neighborhood::Neighborhoods;
 use smooth::LocalCharts;
-
-/// Targets that a vertex can be assigned to while edges count, when it is near the right one; at most.
-const EDGE_CANDIDATES: usize = 32;
+use triangulation::carried_on;
 
 /// Options of [`pmf`].
 #[derive(Clone, Debug, PartialEq)]
@@ -57,13 +56,10 @@ pub struct PmfOptions {
     /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
     /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
     pub descriptor_weight: f64,
-    /// Rounds, at most, in which the edges of the source that go to edges of the target count, where the meshes are given and
-    /// seem to be triangulated alike. They stop at a map that was there before. Range 0 and up, default 30.
-    pub edge_rounds: usize,
-    /// Weight of an edge that goes to an edge, against one squared distance between neighbours. Range 0 and up, default 1.
-    pub edge_weight: f64,
-    /// Meshes are triangulated alike if at least this share of the source's edges goes to edges before those rounds. Between
-    /// separate triangulations of a torus it was 0.53. Range 0 to 1, default 0.7.
+    /// Where the meshes are given: they are taken to be triangulated alike, as registrations of one template are, if the map can
+    /// be carried on from triangle to triangle so that at least this share of the source's edges goes to edges. That map then
+    /// is the result, exact whatever the shapes; it comes from the triangulation and says nothing about the filter. Range 0
+    /// to 1, default 0.95.
     pub alike: f64,
 }
 
@@ -78,9 +74,7 @@ impl Default for PmfOptions {
             neighbors_end: 10,
             candidates: 128,
             descriptor_weight: 0.5,
-            edge_rounds: 30,
-            edge_weight: 1.0,
-            alike: 0.7,
+            alike: 0.95,
         }
     }
 }
@@ -102,8 +96,9 @@ pub struct PmfInfo {
     /// Vertices that no candidate was left for, which got what was free at the end (source no larger than the target), or the
     /// nearest target, taken or not (source larger).
     pub left_over: usize,
-    /// The share of the source's edges that go to edges of the target, before the rounds in which they count; 0 without meshes.
-    pub edges_kept: f64,
+    /// The share of the source's edges that go to edges of the target, where the map follows a triangulation that both meshes
+    /// have; `None` where they have none in common, or are not given.
+    pub edges_kept: Option<f64>,
 }
 
 /// Refines a point map by the product manifold filter.
@@ -149,18 +144,10 @@ pub fn pmf(
         filter.averages = charts.average(&target.rows, &filter.targets, PointMap::UNMATCHED);
         filter.assign(&assigner, around);
     }
-    let edges = hints.meshes.map(|meshes| EdgeTerm::new(meshes, options.edge_weight));
-    let edges_kept = edges.as_ref().map_or(0.0, |edges| edges.kept(&filter.targets));
-    let assigner = match &edges {
-        Some(edges) if edges_kept >= options.alike => {
-            let candidates = options.candidates.min(EDGE_CANDIDATES);
-            let assigner = Assigner::new(&target.rows, &target.neighborhoods, candidates, term());
-            let assigner = assigner.with_edges(edges);
-            filter.settle(&assigner, &source, &target, options);
-            assigner
-        }
-        _ => assigner,
-    };
+    let carried = hints.meshes.map(|meshes| carried_on(meshes, &filter.targets));
+    let carried = carried.filter(|&(_, share)| share >= options.alike);
+    let edges_kept = carried.as_ref().map(|carried| carried.1);
+    filter.targets = carried.map_or(filter.targets, |carried| carried.0);
     let left_over = filter.complete(&assigner, around);
     let confidence = Some(cosines(&filter.averages, &target.rows, &filter.targets));
     let map = PointMap { targets: filter.targets, confidence, n_target: basis_target.n() };
@@ -197,21 +184,6 @@ impl Filter {
         let changed = targets.iter().zip(&self.targets).filter(|(new, old)| new != old).count();
         self.changed.push(changed as f64 / targets.len() as f64);
         self.targets = targets;
-    }
-
-    /// Assigns by local averages until the map comes back, which it may do after two rounds as matches change places.
-    fn settle(&mut self, assigner: &Assigner, source: &Embedding, target: &Embedding, options: &PmfOptions) {
-        let charts = LocalCharts::new(&source.rows, &source.neighborhoods, options.neighbors_end);
-        let mut before_last = Vec::new();
-        for _ in 0..options.edge_rounds {
-            let last = self.targets.clone();
-            self.averages = charts.average(&target.rows, &self.targets, PointMap::UNMATCHED);
-            self.assign(assigner, &source.neighborhoods);
-            if self.targets == last || self.targets == before_last {
-                break;
-            }
-            before_last = last;
-        }
     }
 
     /// Matches what is left without; returns how many those were.
@@ -295,9 +267,6 @@ fn check(options: &PmfOptions) -> Result<(), RefineError> {
     }
     if !(options.descriptor_weight >= 0.0 && options.descriptor_weight.is_finite()) {
         return bad("descriptor_weight", options.descriptor_weight, "0 or more".into());
-    }
-    if !(options.edge_weight >= 0.0 && options.edge_weight.is_finite()) {
-        return bad("edge_weight", options.edge_weight, "0 or more".into());
     }
     if !(0.0..=1.0).contains(&options.alike) {
         return bad("alike", options.alike, "from 0 to 1".into());

@@ -101,7 +101,7 @@ pub(crate) enum Simulated {
     /// For scans as the paper trains on them:
     ///
     ///   fmnet-train simulate scans FAUST/registrations data/scans
-    ///   fmnet-train train --dataset data/scans --out runs/scans --k 70 --sampling area --jitter 10
+    ///   fmnet-train train --dataset data/scans --out runs/scans -k 70 --sampling area --jitter 10
     #[command(verbatim_doc_comment)]
     Scans {
         /// Registrations to scan: a folder of closed shapes that correspond vertex by vertex, such as FAUST's or SCAPE's
@@ -122,7 +122,7 @@ pub(crate) enum Simulated {
     /// for testing, are cut out of different ones.
     ///
     ///   fmnet-train simulate parts TOSCA/dog data/dog-parts
-    ///   fmnet-train train --dataset data/dog-parts --out runs/dog --k 100 --steps 1000
+    ///   fmnet-train train --dataset data/dog-parts --out runs/dog -k 100 --steps 1000
     #[command(verbatim_doc_comment)]
     Parts {
         /// Poses to cut: a folder of shapes that correspond vertex by vertex within each class, such as TOSCA's

@@ -58,7 +58,11 @@ pub(super) fn read(path: &Path, console: &Console) -> Result<fmnet::Mesh> {
 
 fn summary_text(result: &Match, seconds: f64) -> String {
     let matched = result.map.iter().flatten().count();
-    format!("{matched} of {} source vertices matched in {seconds:.2} s", result.map.len())
+    let origin = match result.pmf_info.as_ref().and_then(|info| info.edges_kept) {
+        Some(_) => "; both meshes are triangulated alike, and the map follows the triangulation",
+        None => "",
+    };
+    format!("{matched} of {} source vertices matched in {seconds:.2} s{origin}", result.map.len())
 }
 
 /// Settings and outcome of a match, for scripts.
@@ -68,6 +72,9 @@ pub(super) fn summary(matcher: &Matcher, result: &Match) -> Value {
         json!({ "iterations": info.iterations, "converged": info.converged, "objective": info.objective,
                 "initial_objective": info.initial_objective })
     });
+    let filter = result.pmf_info.as_ref().map(
+        |info| json!({ "changed": info.changed, "left_over": info.left_over, "edges_kept": info.edges_kept }),
+    );
     json!({
         "matched": result.map.iter().flatten().count(),
         "n_source": result.map.len(),
@@ -77,6 +84,7 @@ pub(super) fn summary(matcher: &Matcher, result: &Match) -> Value {
         "model": matcher.network().map(|n| n.metadata()),
         "backend": matcher.network().map(|n| n.backend()),
         "functional_map": { "rank": info.rank, "condition": info.condition },
+        "pmf": filter,
         "upscale": upscale,
     })
 }

@@ -92,6 +92,7 @@ fn suffix(refinement: Refinement) -> &'static str {
         Refinement::Icp => " + ICP",
         Refinement::Zoomout => " + ZoomOut",
         Refinement::Pmf => " + PMF",
+        Refinement::PmfGeometry => " + PMF, geometry alone",
     }
 }
 
