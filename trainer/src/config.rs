@@ -122,7 +122,7 @@ train_config! {
     pool: usize = 2500,
     /// Eigenfunctions of each shape, 1 to 352
     k: usize = 120,
-    /// Meshes of more vertices are decimated to so many, 500 or more; 0: never
+    /// Meshes of more vertices are decimated to so many; 0: never
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area), between 0 and 1
     shot_radius: f64 = ShotOptions::default().radius,
