@@ -59,6 +59,9 @@ pub struct Cache {
 
 impl Cache {
     /// Opens the folder, which is created if absent.
+    ///
+    /// # Errors
+    /// If the folder cannot be made.
     pub fn open(folder: &Path) -> Result<Self, IoError> {
         std::fs::create_dir_all(folder).map_err(|source| IoError::Write { path: folder.into(), source })?;
         Ok(Self { folder: folder.to_path_buf() })
@@ -95,6 +98,9 @@ impl Cache {
     }
 
     /// Writes an entry.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn put(&self, kind: &str, key: CacheKey, payload: &[u8]) -> Result<(), IoError> {
         write_atomically(&self.path(kind, key), |out| {
             out.write_all(MAGIC)?;
@@ -130,7 +136,7 @@ fn checked_payload(mut bytes: Vec<u8>, key: CacheKey) -> Result<Vec<u8>, String>
     Ok(bytes)
 }
 
-/// Writes plain values and arrays one after another, little-endian.
+/// Writes plain values and arrays one after another, in the byte order of the machine: a folder is not for machines of both.
 #[derive(Default)]
 pub struct Encoder(Vec<u8>);
 

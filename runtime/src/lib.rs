@@ -46,7 +46,7 @@
 //! | network | [`network`] | learned descriptors, `[n, 352]`, by tract or onnxruntime |
 //! | functional map | [`fmap`] | the matrix `C`, `[k_target, k_source]` |
 //! | point map | [`point_map`] | for each source vertex a target vertex |
-//! | refinement | [`refine`] | ZoomOut, spectral ICP |
+//! | refinement | [`refine`] | ZoomOut, spectral ICP, the product manifold filter |
 //! | upscaling | [`upscale`] | from decimated to full meshes |
 //! | evaluation | [`eval`], [`geodesic`] | geodesic errors and curves; exact distances |
 //! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |

@@ -56,23 +56,35 @@ impl<T: Copy> Matrix<T> {
     }
 
     /// Row `i`, of length `cols`.
+    ///
+    /// # Panics
+    /// If there is no such row.
     pub fn row(&self, i: usize) -> &[T] {
         &self.data[i * self.cols..(i + 1) * self.cols]
     }
 
     /// Row `i`, of length `cols`, to write to.
+    ///
+    /// # Panics
+    /// If there is no such row.
     pub fn row_mut(&mut self, i: usize) -> &mut [T] {
         &mut self.data[i * self.cols..(i + 1) * self.cols]
     }
 
     /// The first `cols` columns, copied.
+    ///
+    /// # Panics
+    /// If there are fewer columns.
     pub fn first_cols(&self, cols: usize) -> Self {
         assert!(cols <= self.cols, "asked for {cols} of {} columns", self.cols);
         let data = (0..self.rows).flat_map(|i| self.row(i)[..cols].iter().copied()).collect();
         Self { rows: self.rows, cols, data }
     }
 
-    /// The rows listed in `indices`, copied, in that order.
+    /// The rows listed in `indices`, 0-based, copied, in that order.
+    ///
+    /// # Panics
+    /// If there is no such row.
     pub fn select_rows(&self, indices: &[u32]) -> Self {
         let data = indices.iter().flat_map(|&i| self.row(i as usize).iter().copied()).collect();
         Self { rows: indices.len(), cols: self.cols, data }

@@ -57,7 +57,7 @@ fn with_margin(bytes: u64) -> u64 {
     bytes + bytes / 8
 }
 
-/// Bytes of a search among `n_target` rows of width `k` by `n_source` rows: the transported rows, the sorted copy.
+/// Bytes of a search among `n_target` rows of width `k` by `n_source` rows, all f64: the transported rows, the sorted copy.
 pub fn search_bytes(n_source: usize, n_target: usize, k: usize) -> u64 {
     8 * k as u64 * (2 * n_source as u64 + 2 * n_target as u64)
 }
@@ -79,10 +79,10 @@ fn ledger() -> MutexGuard<'static, Ledger> {
     LEDGER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sets memory aside for a stage; hold the result while it runs.
+/// Sets memory aside for a stage; hold the result while it runs. `needed` is in bytes, `remedy` what an error advises.
 ///
 /// # Errors
-/// Where more is needed than available.
+/// Where more is needed than available; never where that is not known.
 pub fn reserve(stage: &'static str, needed: u64, remedy: &'static str) -> Result<Reservation, MemoryError> {
     let mut ledger = ledger();
     if ledger.reserved == 0 {

@@ -82,26 +82,28 @@ pub enum ModelSource {
 /// Settings of a [`Matcher`]. What is `None` comes from the model, or without one from the paper.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MatchOptions {
-    /// Learned descriptors, or SHOT.
+    /// Learned descriptors, which are the default, or SHOT.
     pub descriptor: DescriptorKind,
-    /// The model, for learned descriptors.
+    /// The model, for learned descriptors. Default: the one that is built in.
     pub model: ModelSource,
-    /// What computes the network.
+    /// What computes the network. Default: tract.
     pub backend: Backend,
-    /// Number of eigenfunctions of the functional map. Default: the model's; 120 for SHOT.
+    /// Number of eigenfunctions of the functional map, from 1 to what [`eigenbasis`] gives of the working meshes. Default:
+    /// the model's; 120 for SHOT.
     pub k: Option<usize>,
     /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT;
     /// [`FmapSolver::Part`] for a part and its whole.
     pub solver: Option<FmapSolver>,
-    /// SHOT radius relative to sqrt(area). Default: the model's; that of [`ShotOptions`] for SHOT.
+    /// SHOT radius relative to sqrt(area), above 0. Default: the model's; that of [`ShotOptions`] for SHOT.
     pub shot_radius: Option<f64>,
-    /// Meshes of more vertices are decimated to so many; `Some(None)`: never. Default: the model's; 15000 for SHOT.
+    /// Meshes of more vertices are decimated to so many, 4 or more; `Some(None)`: never. Default: the model's; 15000 for
+    /// SHOT.
     pub decimate: Option<Option<usize>>,
     /// Refinement. Default: ZoomOut for learned descriptors, none for SHOT.
     pub refinement: Option<Refinement>,
-    /// Upscaling of the map of decimated meshes.
+    /// Upscaling of the map of decimated meshes. Default: the l2,1 problem.
     pub upscaling: Upscaling,
-    /// Folder of results kept for each shape; `None`: nothing is kept.
+    /// Folder of results kept for each shape; `None`, the default: nothing is kept.
     pub cache: Option<PathBuf>,
 }
 
@@ -126,9 +128,11 @@ pub struct DescribedShape {
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Match {
-    /// Target vertex of each source vertex, in the input's vertices.
+    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source; those that repair dropped are
+    /// unmatched.
     pub map: PointMap,
-    /// The functional map of the working meshes, `[k_target, k_source]`, before refinement.
+    /// The functional map of the working meshes, `[k, k]` (target x source), before refinement; between bases at unit area
+    /// ([`Shape::unit_basis`]).
     pub functional_map: Matrix,
     /// How its solution went.
     pub functional_map_info: FmapInfo,
@@ -154,6 +158,10 @@ pub struct Matcher {
 
 impl Matcher {
     /// Loads the model and settles every option.
+    ///
+    /// # Errors
+    /// If the model cannot be read or breaks its contract, this build lacks the back-end, or the cache's folder cannot be
+    /// made.
     pub fn new(options: &MatchOptions) -> Result<Self, Error> {
         let network = match (options.descriptor, &options.model) {
             (DescriptorKind::Shot, _) => None,
@@ -191,7 +199,7 @@ impl Matcher {
         })
     }
 
-    /// The settings that shapes are processed with.
+    /// The settings that shapes are processed with; small meshes get fewer eigenfunctions for refinement than its `k` says.
     pub fn shape_options(&self) -> &ShapeOptions {
         &self.shape_options
     }
@@ -207,12 +215,20 @@ impl Matcher {
     }
 
     /// Processes a shape and computes its descriptors; `name` is for messages.
+    ///
+    /// # Errors
+    /// If the mesh has no surface left after repair, is too small for `k` eigenfunctions or too large for the memory, if the
+    /// radius is out of range, the network fails, or the cache cannot be written; all but the last two name the shape.
     pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
         self.describe_by(&self.options_for(mesh), name, mesh, observer)
     }
 
-    /// As [`Matcher::describe`], for a part of a shape in the unit of the whole: `whole_area` is the area of that, in squared
-    /// units. A part may be the source of a map to the whole, in whatever pose, and is matched as a part.
+    /// As [`Matcher::describe`], for a part of a shape in the unit of the whole: `whole_area` is the area of that, in
+    /// squared units of the mesh, above 0. A part may be the source of a map to the whole, in whatever pose, and is matched
+    /// as a part.
+    ///
+    /// # Errors
+    /// As [`Matcher::describe`].
     pub fn describe_part(
         &self,
         name: &str,
@@ -261,7 +277,15 @@ impl Matcher {
         ShapeOptions { k: self.shape_options.k.min(available), ..self.shape_options.clone() }
     }
 
-    /// Computes the map of a pair.
+    /// Computes the map of a pair, from the source to the target; that of a part to its whole where the source was
+    /// described as one.
+    ///
+    /// # Errors
+    /// If the descriptors are not finite, a stage would take more memory than there is, the refinement fails, or the
+    /// matches are too few to be upscaled.
+    ///
+    /// # Panics
+    /// If a shape was described with fewer eigenfunctions than [`Matcher::k`], by another matcher.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
@@ -400,6 +424,9 @@ impl Matcher {
 }
 
 /// Matches two meshes with the given options: one pair, everything computed anew.
+///
+/// # Errors
+/// As [`Matcher::new`], [`Matcher::describe`] and [`Matcher::match_shapes`].
 pub fn match_meshes(source: &Mesh, target: &Mesh, options: &MatchOptions) -> Result<Match, Error> {
     let matcher = Matcher::new(options)?;
     let observer: Observer = &crate::events::ignore;

@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 /// Settings of [`Shape::process`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeOptions {
-    /// Meshes of more vertices than this are decimated to it; `None`: never. Default 15000, as in the paper.
+    /// Meshes of more vertices than this are decimated to it; 4 or more, `None`: never. Default 15000, as in the paper.
     pub decimate: Option<usize>,
-    /// Number of eigenpairs. Range 1 to 500, default 120.
+    /// Number of eigenpairs. From 1 to what [`eigenbasis`] gives of the mesh, a sixth of its vertices at least; default 120.
     pub k: usize,
     /// Settings of the SHOT descriptor.
     pub shot: ShotOptions,
@@ -46,13 +46,13 @@ pub struct Shape {
     pub input_of_full: Vec<u32>,
     /// For each input vertex its vertex in `full_mesh`, [`Shape::NONE`] where repair dropped it, `[n_input]`.
     pub full_of_input: Vec<u32>,
-    /// The decimated mesh and, for each of its vertices, the vertex of `full_mesh`; absent for small meshes.
+    /// The decimated mesh and, for each of its vertices, the vertex of `full_mesh`, `[n]`; absent for small meshes.
     pub decimated: Option<(Mesh, Vec<u32>)>,
-    /// Eigenbasis of the working mesh.
+    /// Eigenbasis of the working mesh, `[n, k]`, in the mesh's own unit.
     pub basis: Eigenbasis,
-    /// SHOT descriptors of the working mesh, `[n, 352]`.
+    /// SHOT descriptors of the working mesh, `[n, 32 (bins + 1)]`: `[n, 352]` by default.
     pub shot: Matrix<f32>,
-    /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]).
+    /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]), in squared units of the mesh.
     pub whole_area: Option<f64>,
 }
 
@@ -61,6 +61,10 @@ impl Shape {
     pub const NONE: u32 = u32::MAX;
 
     /// Runs every stage on a mesh as read.
+    ///
+    /// # Errors
+    /// If repair leaves no face, the decimation target or the SHOT radius is out of range, the eigenbasis cannot be
+    /// computed or would take more memory than there is; it names the shape.
     pub fn process(
         name: &str,
         mesh: &Mesh,
@@ -116,6 +120,9 @@ impl Shape {
     }
 
     /// As [`Shape::process`], but looks into the cache first and leaves the result there.
+    ///
+    /// # Errors
+    /// As [`Shape::process`], and if the cache cannot be written.
     pub fn process_cached(
         name: &str,
         mesh: &Mesh,
@@ -134,7 +141,7 @@ impl Shape {
         Ok(shape)
     }
 
-    /// The key of a shape: the mesh's content and the options.
+    /// The key of a shape: the mesh's content, the options and the version of the library.
     pub fn cache_key(mesh: &Mesh, options: &ShapeOptions) -> CacheKey {
         let options = serde_json::to_vec(options).expect("plain data serialises");
         CacheKey::of(&[
@@ -150,17 +157,23 @@ impl Shape {
         self.decimated.as_ref().map_or(&self.full_mesh, |(mesh, _)| mesh)
     }
 
-    /// Number of vertices of the working mesh.
+    /// Number of vertices `n` of the working mesh.
     pub fn n(&self) -> usize {
         self.mesh().n_vertices()
     }
 
     /// The first `k` eigenpairs where the area of the shape, or of the whole that it is a part of, counts as 1.
+    ///
+    /// # Panics
+    /// If the shape has fewer than `k` eigenpairs.
     pub fn unit_basis(&self, k: usize) -> Eigenbasis {
         self.basis.in_unit(self.whole_area.unwrap_or_else(|| self.basis.area()), k)
     }
 
     /// Vertex of `full_mesh` of a vertex of the working mesh.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
     pub fn full_of_work(&self, vertex: u32) -> u32 {
         self.decimated.as_ref().map_or(vertex, |(_, injection)| injection[vertex as usize])
     }

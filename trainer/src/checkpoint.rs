@@ -24,13 +24,13 @@ pub struct Checkpoint {
     pub config: TrainConfig,
     /// Minibatches done.
     pub step: u64,
-    /// Best validated mean error so far; infinite before the first validation.
+    /// Best validated mean error over sqrt(area), times 100, so far; infinite before the first validation.
     pub best_error: f64,
-    /// Flat parameters.
+    /// Flat parameters, `[p]`.
     pub parameters: Vec<f32>,
     /// The optimiser's state.
     pub adam: AdamState,
-    /// Running statistics of the normalisations.
+    /// Running statistics of the two normalisations of each block, `[blocks, 2]`.
     pub running: Vec<[BatchMoments; 2]>,
 }
 
@@ -63,6 +63,9 @@ pub enum CheckpointError {
 
 impl Checkpoint {
     /// The state of a runner after `step` minibatches.
+    ///
+    /// # Errors
+    /// If the parameters cannot be read from the device.
     pub fn of(
         runner: &StepRunner,
         config: &TrainConfig,
@@ -80,6 +83,9 @@ impl Checkpoint {
     }
 
     /// A runner in this state.
+    ///
+    /// # Errors
+    /// If the state does not fit the configuration's network.
     pub fn into_runner(self, device: &Device) -> Result<StepRunner, CheckpointError> {
         let network = self.network(device)?;
         let mut runner = StepRunner::new(network, self.config.step_options())
@@ -89,6 +95,9 @@ impl Checkpoint {
     }
 
     /// The network in this state.
+    ///
+    /// # Errors
+    /// If the state does not fit the configuration's network.
     pub fn network(&self, device: &Device) -> Result<Network, CheckpointError> {
         let mut network = Network::new(self.config.network_options(), device)?;
         network.set_parameter_values(&self.parameters)?;
@@ -97,6 +106,9 @@ impl Checkpoint {
     }
 
     /// Writes the file.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), CheckpointError> {
         let running: Vec<f64> =
             self.running.iter().flatten().flat_map(|m| m.mean.iter().chain(&m.variance).copied()).collect();
@@ -125,6 +137,9 @@ impl Checkpoint {
     }
 
     /// Reads the file.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is no checkpoint of this version.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         let bytes = std::fs::read(path)
             .map_err(|source| CheckpointError::Read { path: path.to_path_buf(), source })?;

@@ -29,7 +29,7 @@ pub enum Sampling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum LossKind {
-    /// The soft error of the soft correspondence (the paper's equation "soft_corr").
+    /// The soft error of the soft correspondence (the paper's equations "soft_corr" and "lossf").
     Soft,
     /// The contrastive loss without the functional map (the paper's equation "siam").
     Siamese,
@@ -112,33 +112,33 @@ train_config! {
     cache: PathBuf = PathBuf::new(),
     /// Splits to train on: train, validation, test, separated by commas
     splits: List<Split> = List(vec![Split::Train]),
-    /// Minibatches to train for
+    /// Minibatches to train for, 1 or more
     steps: u64 = 3000,
-    /// Pairs in a minibatch; their gradients are averaged
+    /// Pairs in a minibatch, 1 or more; their gradients are averaged
     pairs: usize = 1,
-    /// Points in a minibatch, at most; the paper uses about 1500
+    /// Points in a minibatch, at most, k or more; the paper uses about 1500
     points: usize = 1000,
-    /// Points of each group between which geodesic distances are computed beforehand
+    /// Points of each group between which geodesic distances are computed beforehand, 100 or more
     pool: usize = 2500,
     /// Eigenfunctions of each shape, 1 to 352
     k ('k'): usize = 120,
     /// Meshes of more vertices are decimated to so many; 0: never
     decimate: usize = 15_000,
-    /// SHOT radius, relative to sqrt(area)
+    /// SHOT radius, relative to sqrt(area), between 0 and 1
     shot_radius: f64 = ShotOptions::default().radius,
     /// Solver of the functional map inside the training
     solver: SolverKind = SolverKind::Regularized,
-    /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T
+    /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T, 0 or more
     mask_weight: f64 = 0.1,
     /// What is minimised
     loss: LossKind = LossKind::Soft,
     /// The norm that columns of the soft correspondence are divided by
     column_norm: ColumnNorm = ColumnNorm::L2,
-    /// Siamese loss: margin of dissimilar points
+    /// Siamese loss: margin of dissimilar points, above 0
     margin: f64 = 1.0,
-    /// Siamese loss: trade-off between similar and dissimilar points, between 0 and 1
+    /// Siamese loss: share of similar points against dissimilar ones, 0 to 1
     gamma: f64 = 0.5,
-    /// Residual blocks
+    /// Residual blocks, 1 to 64
     blocks: usize = 7,
     /// Normalisation inside the residual blocks
     normalization: Normalization = Normalization::PerShape,
@@ -146,21 +146,21 @@ train_config! {
     activation: Activation = Activation::Elu,
     /// How points are drawn
     sampling: Sampling = Sampling::Uniform,
-    /// Each point is replaced by one of so many nearest vertices; 1: none; the paper uses 10 for scans
+    /// Each point is replaced by one of so many nearest vertices, 1 (none) to 100; the paper uses 10 for scans
     jitter: usize = 1,
-    /// Learning rate of Adam at the beginning
+    /// Learning rate of Adam at the beginning, above 0
     learning_rate: f64 = 1e-3,
-    /// Learning rate at the end; it falls along a half cosine
+    /// Learning rate at the end, 0 or more; it falls along a half cosine
     final_learning_rate: f64 = 1e-5,
     /// Gradients of a larger norm are scaled down to it; 0: never
     clip: f64 = 0.0,
     /// Seed of the initialisation, the pools and the minibatches
     seed: u64 = 1,
-    /// Minibatches between checkpoints
+    /// Minibatches between checkpoints, 1 or more
     checkpoint_every: u64 = 100,
     /// Minibatches between validations; 0: never
     validate_every: u64 = 500,
-    /// Pairs of the validation split to validate on
+    /// Pairs of the validation split to validate on, at most
     validation_pairs: usize = 10,
 }
 
@@ -197,6 +197,10 @@ pub enum ConfigError {
 
 impl TrainConfig {
     /// Reads a TOML file; settings it leaves out have their defaults.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is no TOML, or has an unknown setting or one of another type; ranges are left to
+    /// [`TrainConfig::check`].
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Read { path: path.to_path_buf(), source })?;
@@ -210,6 +214,9 @@ impl TrainConfig {
     }
 
     /// Checks every value's range.
+    ///
+    /// # Errors
+    /// If a value is out of its range: the first one.
     pub fn check(&self) -> Result<(), ConfigError> {
         let range = |name, ok: bool, value: &dyn fmt::Display, expected| match ok {
             true => Ok(()),
@@ -301,7 +308,7 @@ impl TrainConfig {
         if self.cache.as_os_str().is_empty() { self.out.join("cache") } else { self.cache.clone() }
     }
 
-    /// Learning rate of minibatch `step`: from `learning_rate` to `final_learning_rate` along a half cosine.
+    /// Learning rate of minibatch `step`, from 0: from `learning_rate` to `final_learning_rate` along a half cosine.
     pub fn learning_rate_at(&self, step: u64) -> f64 {
         let progress = (step as f64 / self.steps as f64).min(1.0);
         let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());

@@ -43,9 +43,9 @@ pub enum TrainEvent {
         step: u64,
         /// Mean geodesic error of the raw maps over sqrt(area), times 100.
         mean_error: f64,
-        /// Share of exact matches.
+        /// Share of exact matches, from 0 to 1.
         exact: f64,
-        /// Share of matches within 0.05.
+        /// Share of matches within 0.05 sqrt(area), from 0 to 1.
         within_5: f64,
         /// Whether it is the best so far.
         best: bool,

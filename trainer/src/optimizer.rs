@@ -60,6 +60,9 @@ impl Adam {
     }
 
     /// Continues from a saved state.
+    ///
+    /// # Errors
+    /// If the state is of another number of parameters.
     pub fn restore(&mut self, state: AdamState) -> Result<()> {
         let len = self.first.dims1()?;
         if state.first.len() != len || state.second.len() != len {
@@ -72,7 +75,7 @@ impl Adam {
         Ok(())
     }
 
-    /// Moves `variable` against `gradient` `[p]`.
+    /// Moves `variable`, `[p]`, against `gradient`, `[p]` (Kingma and Ba 2015, algorithm 1).
     pub fn update(&mut self, variable: &Var, gradient: &Tensor, learning_rate: f64) -> Result<()> {
         self.step += 1;
         let AdamOptions { beta1, beta2, epsilon } = self.options;

@@ -28,6 +28,9 @@ pub struct History {
 
 impl History {
     /// The history in a run's `metrics.jsonl`; empty where there is no such file. Other lines are passed over.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
     pub fn read(metrics: &Path) -> Result<Self, IoError> {
         let mut history = Self::default();
         if !metrics.is_file() {
@@ -116,6 +119,9 @@ impl History {
     }
 
     /// Writes the plot.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
     pub fn write(&self, path: &Path, title: &str) -> Result<(), IoError> {
         write_atomically(path, |file| file.write_all(self.to_svg(title).as_bytes()))
     }

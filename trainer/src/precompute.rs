@@ -36,7 +36,7 @@ pub struct PreparedShape {
     /// Basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area, a part as its whole
     /// ([`Shape::unit_basis`]): minibatches and maps need no other.
     pub shape: Shape,
-    /// Vertex of the working mesh of every point of the group, [`MISSING`] where the shape lacks it.
+    /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
     /// Distances between the points of its pool.
     pub pool: Pool,
@@ -63,6 +63,9 @@ pub enum PrepareError {
 }
 
 /// Reads and processes one shape; results are looked up in the cache and left there.
+///
+/// # Errors
+/// If the shape's files cannot be read or do not fit together, it cannot be processed, or the cache cannot be written.
 pub fn prepare(
     entry: &ShapeEntry,
     options: &PrepareOptions,
@@ -160,7 +163,11 @@ impl Pool {
         self.points.is_empty()
     }
 
-    /// Distances between some points of the pool, ascending, `[q, q]`, in units of sqrt(area); none for a part of a shape.
+    /// Distances between some points of the pool, `[q]`, as `[q, q]` in units of sqrt(area), at most 4; none for a part of
+    /// a shape.
+    ///
+    /// # Panics
+    /// If a point is not in the pool.
     pub fn distances(&self, points: &[u32]) -> Option<Matrix<f32>> {
         if self.distances.is_empty() {
             return None;

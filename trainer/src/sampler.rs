@@ -45,6 +45,9 @@ const MIN_COMMON_POINTS: usize = 50;
 
 impl<'a> Sampler<'a> {
     /// Lists the pairs and prepares the jitter.
+    ///
+    /// # Errors
+    /// If no two shapes of a group share enough points of the pool, the larger of 50 and `k`.
     pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
         let mut pairs = Vec::new();
         for (source, s) in shapes.iter().enumerate() {
@@ -68,7 +71,7 @@ impl<'a> Sampler<'a> {
         self.pairs.len()
     }
 
-    /// Minibatch number `index` of the run: one pair or several.
+    /// Minibatch number `index` of the run, from 0: one pair or several.
     pub fn batch(&self, index: u64) -> Vec<PairBatch> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed);
         rng.set_stream(index + 1);

@@ -65,7 +65,7 @@ pub struct StepStats {
     /// Mean geodesic error over sqrt(area) on the samples of the match by the soft map's largest entry; NaN for the
     /// siamese loss.
     pub hard_error: f64,
-    /// Largest condition number of `F F^T` (1 for the siamese loss).
+    /// Largest condition number of `F F^T` of all pairs and directions (1 for the siamese loss).
     pub condition: f64,
     /// Norm of the gradient before clipping.
     pub gradient_norm: f64,
@@ -116,6 +116,9 @@ struct PairLoss {
 
 impl StepRunner {
     /// A fresh optimiser for `network`.
+    ///
+    /// # Errors
+    /// If Candle cannot make the optimiser's state.
     pub fn new(network: Network, options: StepOptions) -> Result<Self, StepError> {
         let adam = Adam::new(network.variable(), options.adam.clone())?;
         Ok(Self { network, adam, options })
@@ -127,6 +130,10 @@ impl StepRunner {
     }
 
     /// Takes a step on the mean loss of `pairs` (at least one).
+    ///
+    /// # Errors
+    /// If a batch does not fit together, a layer fails, or loss or gradient are not finite; the parameters then stay as
+    /// they were.
     pub fn step(&mut self, pairs: &[PairBatch], learning_rate: f64) -> Result<StepStats, StepError> {
         let (mut stats, gradient) = self.gradient(pairs)?;
         stats.gradient_norm = norm(&gradient)?;
@@ -141,7 +148,11 @@ impl StepRunner {
         Ok(stats)
     }
 
-    /// The mean loss of `pairs` and its gradient `[p]`, without a step.
+    /// The mean loss of `pairs` and its gradient `[p]`, without a step; running statistics are updated. The norm of the
+    /// gradient is left NaN.
+    ///
+    /// # Errors
+    /// If there is no pair, a batch does not fit together, or a layer fails.
     pub fn gradient(&mut self, pairs: &[PairBatch]) -> Result<(StepStats, Tensor), StepError> {
         let share = 1.0 / pairs.len() as f64;
         let mut stats = StepStats { loss: 0.0, hard_error: 0.0, condition: 1.0, gradient_norm: f64::NAN };

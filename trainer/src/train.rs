@@ -61,7 +61,7 @@ pub enum TrainError {
     /// A step failed.
     #[error("minibatch {step}: {source}; the last good checkpoint is {checkpoint}")]
     Step {
-        /// The minibatch, from 1.
+        /// The minibatch, from 1; 0 before the first.
         step: u64,
         /// Why.
         source: StepError,
@@ -99,15 +99,19 @@ pub fn best_checkpoint(run: &Path) -> PathBuf {
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainSummary {
-    /// Minibatches done.
+    /// Minibatches done, with those of earlier runs that it went on from.
     pub step: u64,
-    /// Best validated mean error times 100; infinite without validation.
+    /// Best validated mean error over sqrt(area), times 100; infinite without validation.
     pub best_error: f64,
     /// Whether it was stopped before the last minibatch.
     pub stopped: bool,
 }
 
 /// Trains, or goes on training, until the last minibatch or until `stop` is set.
+///
+/// # Errors
+/// If a setting is out of range, the folder holds a run of other settings, a shape cannot be prepared, no two of them
+/// correspond, a step or a validation fails, or a file cannot be read or written.
 pub fn train(
     config: &TrainConfig,
     device: &Device,
@@ -140,6 +144,9 @@ pub fn train(
 }
 
 /// Prepares the shapes of some splits of all the datasets, in parallel.
+///
+/// # Errors
+/// If a dataset or a shape cannot be read or processed.
 pub fn prepare_splits(
     config: &TrainConfig,
     splits: &[Split],
@@ -202,7 +209,8 @@ fn prepare_entries(
     Ok(prepared?)
 }
 
-/// The checkpoint in the run's folder, if it is of this configuration; more steps may be asked for than before.
+/// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may
+/// differ. The number of steps may not: the learning rate depends on it.
 fn resume(config: &TrainConfig) -> Result<Option<Checkpoint>, TrainError> {
     let path = config.out.join(LAST);
     if !path.is_file() {

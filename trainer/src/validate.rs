@@ -26,9 +26,9 @@ pub struct Validation<'a> {
 pub struct ValidationResult {
     /// Mean geodesic error over sqrt(area), times 100.
     pub mean_error: f64,
-    /// Share of exact matches.
+    /// Share of exact matches, from 0 to 1.
     pub exact: f64,
-    /// Share of matches within 0.05.
+    /// Share of matches within 0.05 sqrt(area), from 0 to 1.
     pub within_5: f64,
 }
 
@@ -56,7 +56,14 @@ impl<'a> Validation<'a> {
         self.pairs.is_empty()
     }
 
-    /// Matches every pair.
+    /// Matches every pair with `k` eigenfunctions and `solver`, parts with [`FmapSolver::Part`]. NaN where there are no
+    /// pairs.
+    ///
+    /// # Errors
+    /// If the network, a functional map or a point map fails.
+    ///
+    /// # Panics
+    /// If a shape was prepared with fewer than `k` eigenfunctions.
     pub fn run(&self, network: &Network, k: usize, solver: FmapSolver) -> anyhow::Result<ValidationResult> {
         let mut errors = Vec::new();
         for &(source, target) in &self.pairs {
@@ -97,7 +104,7 @@ impl<'a> Validation<'a> {
     }
 }
 
-/// Descriptors `[n, 352]` of a shape.
+/// Descriptors `[n, 352]` of a shape's SHOT descriptors `[n, 352]`; fails where the network does.
 pub fn descriptors(network: &Network, shot: &Matrix<f32>) -> candle_core::Result<Matrix<f32>> {
     let device = network.variable().device();
     let input = Tensor::from_slice(shot.data(), (shot.rows(), shot.cols()), device)?;

@@ -14,6 +14,9 @@ const CHUNK: usize = 64;
 /// descriptor space, from 1, for each pair of the ground truth; of equal distances the lower index comes first.
 ///
 /// `source` is `[n_source, d]`, `target` `[n_target, d]`.
+///
+/// # Errors
+/// If the descriptors are not of the ground truth's shapes, or differ in width.
 pub fn match_ranks(
     source: &Matrix<f32>,
     target: &Matrix<f32>,
@@ -41,7 +44,7 @@ pub fn match_ranks(
 }
 
 /// Cumulative match characteristic: the probability that the correct match is among the `k` nearest in descriptor
-/// space, for `k` from 1 to `max_rank`, from the ranks that [`match_ranks`] gives.
+/// space, for `k` from 1 to `max_rank`, `[max_rank]`, from the ranks that [`match_ranks`] gives.
 pub fn cmc_curve(ranks: &[u32], max_rank: usize) -> Vec<f64> {
     let mut counts = vec![0usize; max_rank];
     for &rank in ranks {
@@ -57,7 +60,12 @@ pub fn cmc_curve(ranks: &[u32], max_rank: usize) -> Vec<f64> {
     cumulative.collect()
 }
 
-/// The l2 distance in descriptor space of each correct match.
+/// The l2 distance in descriptor space of each correct match, in the order of the pairs.
+///
+/// `source` is `[n_source, d]`, `target` `[n_target, d]`.
+///
+/// # Errors
+/// As [`match_ranks`].
 pub fn correct_match_distances(
     source: &Matrix<f32>,
     target: &Matrix<f32>,

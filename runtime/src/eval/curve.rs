@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 pub struct ErrorCurve {
     /// Normalised errors, ascending.
     pub thresholds: Vec<f64>,
-    /// Share of matches up to each threshold, from 0 to 1.
+    /// Share of matches up to each threshold, from 0 to 1, `[thresholds]`.
     pub shares: Vec<f64>,
 }
 
 impl ErrorCurve {
-    /// The curve of the Princeton protocol: thresholds from 0 to 0.10 in steps of 0.001.
+    /// The curve of the Princeton protocol, of normalised errors: thresholds from 0 to 0.10 in steps of 0.001.
     pub fn princeton(errors: &[f32]) -> Self {
         Self::new(errors, (0..=100).map(|i| f64::from(i) * 0.001).collect())
     }
@@ -47,7 +47,8 @@ impl ErrorCurve {
         })
     }
 
-    /// Area under the curve over the range of its thresholds, by the trapezoid rule, as a share of the best possible.
+    /// Area under the curve over the range of its thresholds, by the trapezoid rule, as a share of the best possible;
+    /// 0 where they have no range.
     pub fn auc(&self) -> f64 {
         let (Some(first), Some(last)) = (self.thresholds.first(), self.thresholds.last()) else { return 0.0 };
         let trapezoids = self.thresholds.windows(2).zip(self.shares.windows(2));
@@ -85,7 +86,11 @@ pub fn curves_csv(curves: &[(&str, &ErrorCurve)]) -> String {
     csv
 }
 
-/// Reads curves as [`curves_csv`] writes them: name and curve of each column. Lines start with a threshold; percentages follow.
+/// Reads curves as [`curves_csv`] writes them, where no name has a comma or a quote: name and curve of each column. Lines
+/// start with a threshold; percentages follow.
+///
+/// # Errors
+/// In words, with the line: no header, a line of another number of columns, or a cell that is no number.
 pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let (_, header) = lines.next().ok_or("no header")?;

@@ -7,9 +7,12 @@ use crate::point_map::PointMap;
 /// Normalised geodesic error `d_Y(y, y*) / sqrt(area(Y))` of each correct match `(x, y*)` of the ground truth, in its
 /// order, where the map sends `x` to `y`.
 ///
-/// `solver` and `area` belong to the target mesh. The error is NaN where the map leaves `x` unmatched and infinite
-/// where `y` and `y*` are on different components; [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say how
-/// they count these.
+/// `solver` and `area`, in squared units, belong to the target mesh. The error is NaN where the map leaves `x` unmatched
+/// and infinite where `y` and `y*` are on different components; [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say
+/// how they count these.
+///
+/// # Errors
+/// If the map, the ground truth and the solver are not for the same meshes, or the map names a vertex that does not exist.
 pub fn geodesic_errors(
     map: &PointMap,
     ground_truth: &GroundTruth,
@@ -47,6 +50,9 @@ pub struct SymmetricErrors {
 
 /// Errors of a map between shapes with a symmetry, for which the mirrored map is as good: those under whichever of the
 /// two ground truths has the smaller mean error, chosen once for the whole map.
+///
+/// # Errors
+/// As [`geodesic_errors`].
 pub fn symmetric_geodesic_errors(
     map: &PointMap,
     ground_truth: &GroundTruth,

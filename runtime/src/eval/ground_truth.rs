@@ -54,6 +54,9 @@ impl FromStr for GroundTruthSource {
 
 impl GroundTruthSource {
     /// The correct matches between meshes of `n_source` and `n_target` vertices.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or what it says does not fit the meshes.
     pub fn load(&self, n_source: usize, n_target: usize) -> Result<GroundTruth, EvalError> {
         match self {
             Self::Identity if n_source != n_target => Err(EvalError::NoIdentity { n_source, n_target }),
@@ -84,6 +87,9 @@ impl GroundTruthSource {
 
 impl GroundTruth {
     /// Correct matches as (source vertex, target vertex).
+    ///
+    /// # Errors
+    /// If a vertex does not exist.
     pub fn new(pairs: Vec<(u32, u32)>, n_source: usize, n_target: usize) -> Result<Self, EvalError> {
         let what = "the ground truth";
         for &(source, target) in &pairs {
@@ -102,6 +108,9 @@ impl GroundTruth {
     }
 
     /// The correct matches that a point map states.
+    ///
+    /// # Errors
+    /// If the map names a target vertex that does not exist.
     pub fn from_map(map: &PointMap) -> Result<Self, EvalError> {
         let pairs = map.iter().enumerate().filter_map(|(s, t)| Some((s as u32, t?)));
         Self::new(pairs.collect(), map.len(), map.n_target)

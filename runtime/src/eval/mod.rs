@@ -93,7 +93,7 @@ pub enum EvalError {
         /// Its length.
         n_target: usize,
     },
-    /// The text after `identity:` is not a number of vertices.
+    /// The text is none of the forms of [`GroundTruthSource`].
     #[error(
         "`{0}` is no ground truth; write `identity`, `identity:N`, a map file, or two .vts files as `A.vts,B.vts`"
     )]

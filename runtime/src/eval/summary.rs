@@ -19,17 +19,17 @@ pub struct ErrorSummary {
     pub mean: f64,
     /// Largest error.
     pub worst: f64,
-    /// Mean error in the unit of the target mesh: centimetres for the FAUST scans.
+    /// Mean error in the unit of the target mesh: metres for FAUST.
     pub mean_length: f64,
     /// Largest error in the unit of the target mesh.
     pub worst_length: f64,
     /// Area under the curve from 0 to 0.10, as a share of the best possible.
     pub auc: f64,
-    /// Share of matches that are exact.
+    /// Share of matches that are exact, from 0 to 1.
     pub exact: f64,
     /// Share of matches with an error of at most 0.05.
     pub within_005: f64,
-    /// Share of vertices that were matched at all.
+    /// Share of the correct matches known whose source vertex was matched at all.
     pub coverage: f64,
     /// Number of matches on another component than the right one.
     pub disconnected: usize,
@@ -37,7 +37,7 @@ pub struct ErrorSummary {
 
 impl ErrorSummary {
     /// Sums up normalised `errors` as [`geodesic_errors`](super::geodesic_errors) gives them, on a target mesh of the
-    /// given area (of several maps taken together, the mean area).
+    /// given area, in its squared units (of several maps taken together, the mean area).
     pub fn new(errors: &[f32], area: f64) -> Self {
         let finite = || errors.iter().copied().filter(|e| e.is_finite()).map(f64::from);
         let n_finite = finite().count();

@@ -20,7 +20,10 @@ const CHUNK: usize = 4096;
 /// `C = (Phi^T A Psi[T])^T = Psi[T]^T A Phi`,
 ///
 /// which takes the delta function at `x` to that at `T(x)`: it minimises `sum_x A_x |C phi(x) - psi(T(x))|^2`
-/// exactly, since `Phi^T A Phi = I`. Vertices without a match are left out of the sum.
+/// exactly, since `Phi^T A Phi = I`, where every vertex has a match. Vertices without one are left out of the sum.
+///
+/// # Errors
+/// If the map has not `n_source` entries, or names a target vertex that does not exist.
 pub fn functional_map_of(
     map: &PointMap,
     basis_source: &Eigenbasis,

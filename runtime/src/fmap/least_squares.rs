@@ -24,6 +24,9 @@ impl Default for LeastSquaresOptions {
 /// values of `F^`, not through the normal equations, which would square its condition number. Directions
 /// below [`LeastSquaresOptions::relative_threshold`] are left out, so that with dependent or too few
 /// descriptors (`q < k_source`) the result is the solution of least norm; [`FmapInfo::rank`] tells.
+///
+/// # Errors
+/// If the matrices are empty, not finite or of different width, or the decomposition does not converge.
 pub fn least_squares(
     f_hat: &Matrix,
     g_hat: &Matrix,

@@ -43,13 +43,13 @@ pub enum FmapSolver {
     },
     /// The mean of the regularised solves of both directions, [`two_way`].
     TwoWay {
-        /// Weight of the mask in each solve, default [`FmapSolver::TWO_WAY_WEIGHT`].
+        /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::TWO_WAY_WEIGHT`].
         weight: f64,
     },
     /// For a source that is a part of the target, with bases in one unit: the transpose of the regularised solve from the
     /// whole to the part, [`part`].
     Part {
-        /// Weight of the mask, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
+        /// Weight of the mask. Range 0 upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
         weight: f64,
     },
 }
@@ -112,13 +112,15 @@ impl FmapSolver {
 /// What a solve found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FmapInfo {
-    /// Number of independent directions kept in the worst conditioned system, at most `k_source`.
+    /// Number of independent directions kept in the worst conditioned system, at most the number of eigenfunctions on the
+    /// side solved from: `k_source`, for a part `k_target`, for both ways the smaller.
     pub rank: usize,
     /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of
     /// `F^`, infinite where `F^` has linearly dependent rows; for the regularised solve a lower bound, from
     /// the pivots, of that of the worst row's system.
     pub condition: f64,
-    /// `||C F^ - G^||_F / ||G^||_F`; 0 where `G^` is zero.
+    /// `||C F^ - G^||_F / ||G^||_F`; 0 where `G^` is zero. For [`FmapSolver::Part`] that of the equation solved,
+    /// `||C^T G^ - F^||_F / ||F^||_F`.
     pub relative_residual: f64,
 }
 
@@ -206,6 +208,11 @@ pub enum FmapError {
 
 /// The functional map `C`, `[k_target, k_source]`, that takes the descriptors' coefficients `f_hat`,
 /// `[k_source, q]`, to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
+///
+/// The mask takes eigenvalues relative to each shape's own area; for [`FmapSolver::Part`] as they are, in one unit of both.
+///
+/// # Errors
+/// If the arrays do not fit together, are empty or not finite, the weight is out of range, or a decomposition fails.
 pub fn functional_map(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,

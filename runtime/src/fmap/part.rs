@@ -12,8 +12,9 @@ use crate::point_map::transposed;
 /// one at its match.
 ///
 /// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`. The eigenvalues, `[k_source]` and `[k_target]`, must be in one unit
-/// ([`crate::spectral::Eigenbasis::in_unit`]): the mask then is slanted by itself, as a part has fewer eigenvalues below any
-/// bound than the whole.
+/// ([`crate::spectral::Eigenbasis::in_unit`]): the mask then is slanted by itself, as a part has fewer eigenvalues below
+/// any bound than the whole. The figures of [`FmapInfo`] are those of that solve, its residual `||C' G^ - F^|| / ||F^||`.
+/// Errors as in [`regularized`].
 pub fn part(
     f_hat: &Matrix,
     g_hat: &Matrix,

@@ -29,9 +29,9 @@ pub fn scale_free_eigenvalues(basis: &Eigenbasis) -> Vec<f64> {
 /// (lambda / s)^0.5`, `s` the largest of all eigenvalues, `D = (re_i - re_j)^2 + (im_i - im_j)^2`, where `re
 /// = g / (g^2 + 1)`, `im = 1 / (g^2 + 1)`. Entries lie between 0 and 1/2.
 ///
-/// The mask does not change when both shapes are scaled together. To let shapes of different size match, pass
-/// eigenvalues times area, as [`scale_free_eigenvalues`] gives them. Eigenvalues below zero, which are
-/// rounded zeros, count as zero.
+/// The eigenvalues are `[k_source]` and `[k_target]`. The mask does not change when both shapes are scaled together. To let
+/// shapes of different size match, pass eigenvalues times area, as [`scale_free_eigenvalues`] gives them. Eigenvalues below
+/// zero, which are rounded zeros, count as zero.
 pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) -> Matrix {
     let largest = eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(0.0, f64::max);
     let scale = if largest > 0.0 { largest } else { 1.0 };
@@ -49,12 +49,16 @@ pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) ->
 }
 
 /// The map `C`, `[k_target, k_source]`, that minimises `||C F^ - G^||_F^2 + weight d sum_ij D_ij C_ij^2`,
-/// with the [`resolvent_mask`] `D` and `d` the mean diagonal of `F^ F^T`.
+/// with the [`resolvent_mask`] `D`, `d` the mean diagonal of `F^ F^T` and `weight` 0 or more.
 ///
 /// `f_hat` is `[k_source, q]`, `g_hat` `[k_target, q]`; the eigenvalues, `[k_source]` and `[k_target]`,
 /// should be [`scale_free_eigenvalues`]. The rows of `C` are independent: row `i` solves `(F^ F^T + weight d
 /// diag(D_i)) c_i = F^ g_i` by a Cholesky factorisation of its own. A row whose system is singular gets the
 /// solution of least norm, and [`FmapInfo::rank`] tells.
+///
+/// # Errors
+/// If the matrices are empty, not finite or of different width, a list of eigenvalues has another length, or the weight is
+/// negative or not finite.
 pub fn regularized(
     f_hat: &Matrix,
     g_hat: &Matrix,

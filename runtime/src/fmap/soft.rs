@@ -48,6 +48,9 @@ pub struct SoftPeak {
 
 impl<'a> SoftCorrespondence<'a> {
     /// The soft correspondence of the functional map `c`, `[k_target, k_source]`.
+    ///
+    /// # Errors
+    /// If `c` is not of that shape.
     pub fn new(
         basis_source: &Eigenbasis,
         basis_target: &'a Eigenbasis,
@@ -61,6 +64,9 @@ impl<'a> SoftCorrespondence<'a> {
     }
 
     /// The whole matrix, `[n_target, n_source]`, if it takes no more than `max_bytes`.
+    ///
+    /// # Errors
+    /// If it takes more.
     pub fn dense(&self, max_bytes: usize) -> Result<Matrix<f32>, FmapError> {
         let (n_target, n_source) = (self.basis_target.rows(), self.transported.rows());
         let needed = n_target.saturating_mul(n_source).saturating_mul(size_of::<f32>());

@@ -11,8 +11,8 @@ use crate::Matrix;
 /// descriptors disagree is not what the other gets wrong. On FAUST pairs the mean error of the raw map falls by a quarter, and
 /// a weaker mask, [`super::FmapSolver::TWO_WAY_WEIGHT`], then is best.
 ///
-/// Arguments as in [`regularized`]. The rank is the smaller, the condition the larger one of the two solves; the residual is
-/// that of the mean in `C F^ = G^`.
+/// Arguments and errors as in [`regularized`]. The rank is the smaller, the condition the larger one of the two solves; the
+/// residual is that of the mean in `C F^ = G^`.
 pub fn two_way(
     f_hat: &Matrix,
     g_hat: &Matrix,

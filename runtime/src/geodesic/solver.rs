@@ -76,12 +76,12 @@ impl GeodesicSolver {
         self.from_nearest(&[source])
     }
 
-    /// Writes the distances from `source` to every vertex into `distances`, `[n]`.
+    /// Writes the distances from `source` to every vertex into `distances`, which panics where that is not `[n]`.
     pub fn from_source_into(&self, source: u32, distances: &mut [f32]) {
         distances.copy_from_slice(self.search().run(&[source]));
     }
 
-    /// Distances from the nearest of `sources` to every vertex, `[n]`.
+    /// Distances from the nearest of `sources` to every vertex, `[n]`; infinite without sources.
     pub fn from_nearest(&self, sources: &[u32]) -> Vec<f32> {
         self.search().run(sources).to_vec()
     }
@@ -94,7 +94,7 @@ impl GeodesicSolver {
         distances
     }
 
-    /// Distances from `source` to `targets`, in their order; looks no further than the farthest of them.
+    /// Distances from `source` to `targets`, `[t]` in their order; looks no further than the farthest of them.
     pub fn to_targets(&self, source: u32, targets: &[u32]) -> Vec<f32> {
         let mut distances = vec![0.0; targets.len()];
         self.search().run_to(&[source], targets, &mut distances);
@@ -119,7 +119,7 @@ impl GeodesicSolver {
         self.distances_between(&all)
     }
 
-    /// Distance of each pair of vertices, in parallel.
+    /// Distance of each pair of vertices, `[pairs]`, in parallel.
     ///
     /// Pairs are grouped by their second vertex, and each search ends at the farthest first vertex of its group:
     /// the distances of nearly correct matches to the correct ones cost next to nothing.

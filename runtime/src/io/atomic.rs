@@ -26,6 +26,9 @@ fn lock() -> MutexGuard<'static, Vec<PathBuf>> {
 /// reader ever sees half a file and an old one survives a failure.
 ///
 /// A link is followed; what is neither a file nor absent (a device, a pipe) is written in place.
+///
+/// # Errors
+/// If the folder is absent, the path is a folder, or `write` or the system fails.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,

@@ -36,7 +36,7 @@ pub struct Attributes {
     pub vertex_colors: Option<Vec<[u8; 4]>>,
     /// Texture coordinates (u, v) of each triangle's three corners, `[m, 3, 2]`; `(0, 0)` is the image's lower left.
     pub corner_uvs: Option<Vec<[[f32; 2]; 3]>>,
-    /// The image that `corner_uvs` refers to.
+    /// The image that `corner_uvs` refers to; it is not written without these.
     pub texture: Option<Texture>,
     /// Named scalar fields, each `[n]`.
     pub vertex_scalars: Vec<(String, Vec<f32>)>,
@@ -61,11 +61,12 @@ pub enum Texture {
 /// Linear blend skinning: up to four joints move each vertex.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Skin {
-    /// The joints of the skeleton.
+    /// The joints of the skeleton, parents before children.
     pub joints: Vec<Joint>,
     /// For each vertex four indices into `joints`, `[n, 4]`.
     pub indices: Vec<[u16; 4]>,
-    /// For each vertex the weights of the four joints, `[n, 4]`; 0 where fewer than four act.
+    /// For each vertex the weights of the four joints, `[n, 4]`, as in the file, where they mostly sum to 1; 0
+    /// where fewer than four act.
     pub weights: Vec<[f32; 4]>,
 }
 

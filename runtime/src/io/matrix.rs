@@ -84,13 +84,20 @@ npy_number!(i64, "<i8", |value| match value {
 
 /// Reads a `.npy` array of one or two dimensions as a matrix; one of `n` numbers becomes `[n, 1]`.
 ///
-/// Integers are converted to floats and `f8` to `f4` by rounding; floats to integers are an error.
+/// Integers are converted to floats and `f8` to `f4` by rounding; floats to integers are an error, and so are integers too
+/// large for `T`.
+///
+/// # Errors
+/// If the file cannot be read, is no such array, ends early, or holds a number that does not fit `T`.
 pub fn read_matrix<T: NpyNumber>(path: &Path) -> Result<Matrix<T>, IoError> {
     let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
     decode(&bytes).map_err(|e| e.in_file(path))
 }
 
-/// Reads a `.npy` array of one dimension, or of two of which one is 1.
+/// Reads a `.npy` array of one dimension, or of two of which one is 1, as `[n]`; numbers are converted as by [`read_matrix`].
+///
+/// # Errors
+/// As [`read_matrix`], and if both dimensions are above 1.
 pub fn read_vector<T: NpyNumber>(path: &Path) -> Result<Vec<T>, IoError> {
     let matrix = read_matrix(path)?;
     if matrix.rows() != 1 && matrix.cols() != 1 {
@@ -101,11 +108,17 @@ pub fn read_vector<T: NpyNumber>(path: &Path) -> Result<Vec<T>, IoError> {
 }
 
 /// Writes a matrix `[rows, cols]` as `.npy`.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_matrix<T: NpyNumber>(path: &Path, matrix: &Matrix<T>) -> Result<(), IoError> {
     write(path, &format!("({}, {})", matrix.rows(), matrix.cols()), matrix.data())
 }
 
 /// Writes a vector `[n]` as `.npy`.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_vector<T: NpyNumber>(path: &Path, vector: &[T]) -> Result<(), IoError> {
     write(path, &format!("({},)", vector.len()), vector)
 }

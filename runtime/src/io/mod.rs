@@ -51,6 +51,9 @@ use error::Parsed;
 ///
 /// Polygons are split into triangle fans, several objects are concatenated in file order. What could not be
 /// kept is said in [`ReadInfo::warnings`].
+///
+/// # Errors
+/// If the file cannot be read, is of no known format, or breaks its rules: then with the line, byte or part where it does.
 pub fn read_mesh(path: &Path) -> Result<MeshFile, IoError> {
     let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
     decode_mesh(&bytes, path)
@@ -58,6 +61,9 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, IoError> {
 
 /// [`read_mesh`] of bytes at hand; `path` gives the format, the name in errors and the folder in which
 /// material, buffer and texture files are looked for.
+///
+/// # Errors
+/// As [`read_mesh`].
 pub fn decode_mesh(bytes: &[u8], path: &Path) -> Result<MeshFile, IoError> {
     let format = MeshFormat::from_path(path).or_else(|| MeshFormat::from_content(bytes));
     let format =
@@ -88,6 +94,10 @@ fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
 /// Vertex `i` of the mesh is vertex `i` of the file. GLB has texture coordinates per vertex only, so a vertex on a
 /// seam is repeated there, behind the `n` vertices of the mesh. A texture that is embedded or in another folder is written beside
 /// a `.ply` or `.obj` as `STEM_texture.png` (or whatever its extension).
+///
+/// # Errors
+/// If the format is none of [`MeshFormat::WRITABLE`], an attribute has not the mesh's size, a skin's joint does not exist
+/// or comes before its parent, the mesh is empty and the format `.glb`, or a file cannot be written.
 pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
     attributes.check(mesh).map_err(|(problem, remedy)| IoError::Unwritable {
         path: path.into(),

@@ -53,6 +53,10 @@ impl PointMapFormat {
 ///
 /// `n_target` is the number of target vertices, against which every index is checked; where it is `None` it is
 /// what the file states (`.csv`), else one more than the largest index.
+///
+/// # Errors
+/// If the file cannot be read, its extension is none of [`PointMapFormat::EXTENSIONS`], a line or entry is no index of a
+/// target vertex, or a `.csv` states another number of targets than `n_target`.
 pub fn read_point_map(path: &Path, n_target: Option<usize>) -> Result<PointMap, IoError> {
     let format = PointMapFormat::of(path)?;
     let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
@@ -60,6 +64,10 @@ pub fn read_point_map(path: &Path, n_target: Option<usize>) -> Result<PointMap, 
 }
 
 /// Writes a point map; the extension decides on the format. Confidences are kept by `.csv` only.
+///
+/// # Errors
+/// If the extension is none of [`PointMapFormat::EXTENSIONS`], the file cannot be written, or an index does not fit
+/// `.npy`'s int32.
 pub fn write_point_map(path: &Path, map: &PointMap) -> Result<(), IoError> {
     match PointMapFormat::of(path)? {
         PointMapFormat::Txt => write_atomically(path, |w| {

@@ -9,6 +9,9 @@ impl Mesh {
     }
 
     /// Area of triangle `face`, in squared units of the file.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
     pub fn face_area(&self, face: usize) -> f64 {
         0.5 * vec3::norm(self.face_cross(face))
     }
@@ -18,12 +21,13 @@ impl Mesh {
         self.face_areas().iter().sum()
     }
 
-    /// Square root of the total area: the length that every length parameter is relative to.
+    /// Square root of the total area, in the unit of the file: the length that every length parameter is relative to.
     pub fn scale(&self) -> f64 {
         self.area().sqrt()
     }
 
-    /// Barycentric vertex areas, `[n]`: a third of the area of the triangles around each vertex. They sum to the area.
+    /// Barycentric vertex areas, `[n]`, in squared units of the file: a third of the area of the triangles around each
+    /// vertex. They sum to the area.
     pub fn vertex_areas(&self) -> Vec<f64> {
         let mut areas = vec![0.0; self.n_vertices()];
         for (face, area) in self.faces().iter().zip(self.face_areas()) {
@@ -35,12 +39,15 @@ impl Mesh {
     }
 
     /// Cross product of two edges of triangle `face`: its normal times twice its area.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
     pub fn face_cross(&self, face: usize) -> [f64; 3] {
         let [a, b, c] = self.corners(face);
         vec3::cross(vec3::sub(b, a), vec3::sub(c, a))
     }
 
-    /// Lowest and highest coordinates of all vertices; `None` for a mesh without vertices.
+    /// Lowest and highest coordinates of all vertices, `[2, 3]`; `None` for a mesh without vertices.
     pub fn bounding_box(&self) -> Option<[[f64; 3]; 2]> {
         let mut vertices = self.vertices().iter();
         let &first = vertices.next()?;
@@ -50,7 +57,7 @@ impl Mesh {
         }))
     }
 
-    /// Length of the bounding box's diagonal; 0 for a mesh without vertices.
+    /// Length of the bounding box's diagonal, in the unit of the file; 0 for a mesh without vertices.
     pub fn diagonal(&self) -> f64 {
         self.bounding_box().map_or(0.0, |[low, high]| vec3::distance(low, high))
     }

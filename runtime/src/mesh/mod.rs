@@ -65,6 +65,9 @@ pub enum MeshError {
 
 impl Mesh {
     /// Checks that every face index is in range and every coordinate finite.
+    ///
+    /// # Errors
+    /// If an index is out of range, a coordinate is not finite, or there are more vertices than 32-bit indices can name.
     pub fn new(vertices: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         let n_vertices = vertices.len();
         if n_vertices >= u32::MAX as usize {
@@ -86,7 +89,7 @@ impl Mesh {
         &self.vertices
     }
 
-    /// Triangles, `[m, 3]` vertex indices, counter-clockwise seen from outside.
+    /// Triangles, `[m, 3]` vertex indices, in an oriented mesh counter-clockwise seen from outside.
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.faces
     }
@@ -101,7 +104,10 @@ impl Mesh {
         self.faces.len()
     }
 
-    /// The three positions of triangle `face`.
+    /// The positions of the three corners of triangle `face`, `[3, 3]`.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
     pub fn corners(&self, face: usize) -> [[f64; 3]; 3] {
         self.faces[face].map(|i| self.vertices[i as usize])
     }

@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 /// For each query point the index of the nearest of `points`, `[q]`. Ties go to any of the nearest.
 ///
 /// # Panics
-/// If `points` is empty while there are queries.
+/// If `points` is empty or has a coordinate that is not finite while there are queries.
 pub fn nearest_vertices(points: &[[f64; 3]], queries: &[[f64; 3]]) -> Vec<u32> {
     nearest_k_vertices(points, queries, 1)
 }
@@ -15,7 +15,7 @@ pub fn nearest_vertices(points: &[[f64; 3]], queries: &[[f64; 3]]) -> Vec<u32> {
 /// points the last one repeats.
 ///
 /// # Panics
-/// If `points` is empty while there are queries, or `count` is 0.
+/// If `points` is empty or has a coordinate that is not finite while there are queries, or `count` is 0.
 pub fn nearest_k_vertices(points: &[[f64; 3]], queries: &[[f64; 3]], count: usize) -> Vec<u32> {
     if queries.is_empty() {
         return Vec::new();

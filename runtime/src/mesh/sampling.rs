@@ -50,7 +50,8 @@ pub fn farthest_point_sampling_by(
     samples
 }
 
-/// Draws `min(count, n)` different vertices, each next one with a probability proportional to its area among those left.
+/// Draws `min(count, n)` different vertices by their `areas`, `[n]` in any unit, each next one with a probability
+/// proportional to its area among those left.
 ///
 /// The order is that of the draws. Areas that are not positive count as zero and come last. Deterministic in the seed.
 /// Efraimidis and Spirakis, Weighted random sampling with a reservoir (2006): the largest `log(u) / area` win.

@@ -10,12 +10,12 @@ use std::fmt;
 /// How many elements of each defect, and how many components, a report names.
 const MAX_EXAMPLES: usize = 5;
 
-/// The elements with a defect: how many, and the first few.
+/// The elements with a defect: how many, and the first few. Vertices and faces are indices, edges pairs of vertices.
 #[derive(Clone, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Found<T> {
     /// How many there are.
     pub count: usize,
-    /// The first few, by index.
+    /// The first five at most, by index.
     pub examples: Vec<T>,
 }
 
@@ -43,7 +43,7 @@ pub struct MeshReport {
     pub n_vertices: usize,
     /// Number of faces.
     pub n_faces: usize,
-    /// Total area.
+    /// Total area, in squared units of the file.
     pub area: f64,
     /// Lowest and highest coordinates; none without vertices.
     pub bounding_box: Option<[[f64; 3]; 2]>,
@@ -65,7 +65,7 @@ pub struct MeshReport {
     pub inconsistent_edges: Found<[u32; 2]>,
     /// Number of connected components.
     pub n_components: usize,
-    /// The largest components by area.
+    /// The five largest components at most, by descending area.
     pub largest_components: Vec<ComponentSize>,
     /// Number of boundary loops.
     pub n_boundary_loops: usize,

@@ -36,13 +36,13 @@ const ONNX_FLOAT: i32 = 1;
 pub struct ModelMetadata {
     /// Format of the file, at most [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// The SHOT descriptor that the network was trained on.
+    /// The SHOT descriptor that the network was trained on: a radius below 1, 10 bins.
     pub shot: ShotOptions,
-    /// Number of eigenfunctions of the functional map.
+    /// Number of eigenfunctions of the functional map. Range 1 to 500.
     pub k: usize,
     /// Solver of the functional map that it was trained with.
     pub solver: FmapSolver,
-    /// Meshes of more vertices are decimated to so many; `None`: never.
+    /// Meshes of more vertices are decimated to so many, 100 or more; `None`: never.
     pub decimate: Option<usize>,
     /// Whether the network takes statistics over all vertices of a shape, so that rows depend on each other.
     pub per_shape_statistics: bool,
@@ -64,7 +64,7 @@ impl ModelMetadata {
         ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot, whole_area: None }
     }
 
-    /// As key-value pairs for `metadata_props`.
+    /// As key-value pairs for `metadata_props`; without a mask its weight is 0, and a `decimate` of 0 stands for never.
     pub fn to_pairs(&self) -> Vec<(String, String)> {
         let (solver, mask_weight) = match self.solver {
             FmapSolver::LeastSquares => ("least-squares", 0.0),
@@ -178,6 +178,9 @@ impl Pairs<'_> {
 }
 
 /// Checks a model file against the contract and reads its metadata. `path` is for messages.
+///
+/// # Errors
+/// If it is no ONNX file, its graph has another input or output, or a key is missing or out of range.
 pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, NetworkError> {
     let contract = |reason: String| NetworkError::Contract { path: path.to_path_buf(), reason };
     let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file: {e}")))?;

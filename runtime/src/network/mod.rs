@@ -108,6 +108,9 @@ impl fmt::Debug for DescriptorNetwork {
 
 impl DescriptorNetwork {
     /// Loads a model file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, and as [`DescriptorNetwork::from_bytes`].
     pub fn load(path: &Path, backend: Backend) -> Result<Self, NetworkError> {
         let bytes = std::fs::read(path)
             .map_err(|e| NetworkError::Read { path: path.to_path_buf(), reason: e.to_string() })?;
@@ -115,6 +118,9 @@ impl DescriptorNetwork {
     }
 
     /// Loads a model from memory; `path` is for messages.
+    ///
+    /// # Errors
+    /// If the file breaks the contract, the back-end is not in this build, or refuses the model.
     pub fn from_bytes(path: &Path, bytes: &[u8], backend: Backend) -> Result<Self, NetworkError> {
         let metadata = contract::read_contract(path, bytes)?;
         let engine = load_engine(bytes, &metadata, backend).map_err(|failure| match failure {
@@ -140,6 +146,9 @@ impl DescriptorNetwork {
     }
 
     /// Learned descriptors `[n, 352]` of SHOT descriptors `[n, 352]`.
+    ///
+    /// # Errors
+    /// If the input has another width, or the back-end fails.
     pub fn descriptors(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, NetworkError> {
         if shot.cols() != WIDTH {
             return Err(NetworkError::Width { width: shot.cols() });

@@ -62,11 +62,14 @@ pub enum RecoverError {
 
 /// For each source vertex `x` the target vertex `y` whose row of `Psi` is nearest to `C phi(x)` (Ovsjanikov
 /// et al. 2012): the delta function at `x`, transported by `c`, `[k_target, k_source]`, looks most like the
-/// one at `y`.
+/// one at `y`. Of equally near ones it is the lowest; every source vertex gets a match.
 ///
 /// The confidence of a match is the cosine of the angle between `C phi(x)` and `psi(y)`, negative ones as 0:
 /// it is 1 where the functional map takes the point exactly to its match, and falls where the map blurs or
 /// contradicts itself.
+///
+/// # Errors
+/// If `c` is not of that shape, or an entry of it or of a basis is not finite.
 pub fn recover(
     c: &Matrix,
     basis_source: &Eigenbasis,
@@ -77,6 +80,9 @@ pub fn recover(
 
 /// [`recover`] with a choice of what is compared; the confidence is the cosine of the angle between what is
 /// compared.
+///
+/// # Errors
+/// As [`recover`].
 pub fn recover_by(
     comparison: Comparison,
     c: &Matrix,

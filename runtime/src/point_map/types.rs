@@ -5,7 +5,7 @@
 pub struct PointMap {
     /// The target vertex of each source vertex, `[n_source]`, 0-based; [`PointMap::UNMATCHED`] where there is none.
     pub targets: Vec<u32>,
-    /// How far each match can be trusted, `[n_source]`, from 0 to 1.
+    /// How far each match can be trusted, `[n_source]`, from 0 to 1; `None` where that is not known.
     pub confidence: Option<Vec<f32>>,
     /// Number of target vertices.
     pub n_target: usize,
@@ -38,7 +38,7 @@ impl PointMap {
         Some(self.targets[source]).filter(|&target| target != Self::UNMATCHED)
     }
 
-    /// The target of each source vertex in turn.
+    /// The target of each source vertex in turn, `None` where it has none.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<u32>> + '_ {
         self.targets.iter().map(|&target| Some(target).filter(|&target| target != Self::UNMATCHED))
     }

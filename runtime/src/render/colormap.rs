@@ -8,7 +8,8 @@ pub const UNMATCHED_COLOR: [u8; 4] = [128, 128, 128, 255];
 
 /// A colour for each vertex that varies smoothly with its position in the bounding box, `[n]` RGBA.
 ///
-/// The longest axis runs from blue to red, the others shade it, so that left and right, front and back differ.
+/// The longest axis runs from red over green and blue to magenta, the others shade it, so that left and right, front and back
+/// differ.
 pub fn position_colors(mesh: &Mesh) -> Vec<[u8; 4]> {
     let (low, high) = bounds(mesh);
     let extent: Vec<f64> = (0..3).map(|i| high[i] - low[i]).collect();
@@ -21,6 +22,9 @@ pub fn position_colors(mesh: &Mesh) -> Vec<[u8; 4]> {
 }
 
 /// The colours of the matched vertices, `[n_source]` RGBA; [`UNMATCHED_COLOR`] where there is none.
+///
+/// # Panics
+/// If a match is beyond `colors_target`, `[n_target]`.
 pub fn map_colors(map: &PointMap, colors_target: &[[u8; 4]]) -> Vec<[u8; 4]> {
     (0..map.len()).map(|i| map.get(i).map_or(UNMATCHED_COLOR, |t| colors_target[t as usize])).collect()
 }

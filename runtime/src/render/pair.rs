@@ -8,7 +8,13 @@ use crate::point_map::PointMap;
 
 /// The source to the left of the target, brought to the same size, matches in the same colour.
 ///
-/// Vertices and faces of the source come first.
+/// Vertices and faces of the source come first, each shape with a largest extent of 1.
+///
+/// # Errors
+/// If a coordinate overflows, or both together have more vertices than 32-bit indices can name.
+///
+/// # Panics
+/// If a match is no vertex of the target.
 pub fn side_by_side(source: &Mesh, target: &Mesh, map: &PointMap) -> Result<(Mesh, Attributes), MeshError> {
     let colors_target = position_colors(target);
     let mut colors = map_colors(map, &colors_target);

@@ -8,11 +8,11 @@ use crate::point_map::PointMap;
 /// An image of 8-bit RGB pixels, row by row from the top left.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// `[height * width]`.
+    /// The pixels, `[height * width]`.
     pub pixels: Vec<[u8; 3]>,
 }
 
@@ -22,7 +22,8 @@ const TURN: f64 = 0.35;
 const FILL: f64 = 0.94;
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 
-/// Both shapes of a pair side by side, the source on the left, matches in the same colour.
+/// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, twice as many
+/// columns. Errors and panics as of [`side_by_side`].
 pub fn pair_picture(
     source: &Mesh,
     target: &Mesh,
@@ -36,7 +37,7 @@ pub fn pair_picture(
 }
 
 /// A mesh seen along the negative z axis, y up, lit from the viewer's side, with the given colours of its vertices, `[n]`
-/// RGBA. Faces seen from behind are drawn as well.
+/// RGBA; vertices beyond these are grey. Faces seen from behind are drawn as well.
 pub fn picture(mesh: &Mesh, colors: &[[u8; 4]], width: usize, height: usize) -> Picture {
     let mut canvas = Canvas::new(width, height);
     let points = on_screen(mesh, width, height);
@@ -80,6 +81,9 @@ impl Picture {
     }
 
     /// The picture as a PNG file.
+    ///
+    /// # Panics
+    /// If it has no pixels, or not `height * width` of them.
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);

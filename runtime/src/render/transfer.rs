@@ -36,6 +36,9 @@ impl Donors {
 
     /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several that match
     /// the same vertex, from the one of the lowest index.
+    ///
+    /// # Panics
+    /// If a match is no vertex of the target.
     pub fn of_target(map: &PointMap, target: &Mesh) -> Self {
         let mut donor: Vec<Option<u32>> = vec![None; target.n_vertices()];
         let mut distance = vec![f64::INFINITY; target.n_vertices()];
@@ -70,6 +73,9 @@ impl Donors {
 
     /// The same with places within the giver's triangles where neighbouring vertices share a donor: the receiver is finer than
     /// the giver, or the map is blurred, and values would come out in steps. Vertices with a donor of their own keep it.
+    ///
+    /// # Panics
+    /// If the meshes are not those of the donors.
     pub fn interpolated(self, receiver: &Mesh, giver: &Mesh) -> Self {
         let place = |blend: Blend| Place { blend, corners: giver.faces()[blend.face as usize] };
         let places = blends(&self, receiver, giver).into_iter().map(|blend| blend.map(place)).collect();
@@ -136,6 +142,9 @@ impl Ord for Ordered {
 }
 
 /// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match.
+///
+/// # Panics
+/// If a donor has no row.
 pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
     let shares: Vec<_> = donors.shares().collect();
     Matrix::from_fn(shares.len(), values.cols(), |i, j| {
@@ -144,6 +153,9 @@ pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
 }
 
 /// For each landmark of the giver the receiving vertex that takes from nearest to it, if any does.
+///
+/// # Panics
+/// If a landmark or a donor is no vertex of the giver.
 pub fn transfer_landmarks(
     landmarks: &[u32],
     giver: &Mesh,
@@ -165,6 +177,9 @@ pub fn transfer_landmarks(
 ///
 /// Vertices without a match are grey, NaN and without weights, triangles without any at the texture's origin. At a seam of the giver's
 /// texture a vertex has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
+///
+/// # Panics
+/// If the attributes are not those of the giver, or the donors not those of both meshes.
 pub fn transfer_attributes(
     giver: &Mesh,
     attributes: &Attributes,

@@ -27,7 +27,7 @@ pub struct ViewerPair<'a> {
     pub caption: &'a str,
 }
 
-/// The whole page.
+/// The whole page. Panics if a match is no vertex of the target.
 pub fn viewer_html(pair: &ViewerPair) -> String {
     let colors_target = position_colors(pair.target);
     let colors_source = map_colors(pair.map, &colors_target);

@@ -16,9 +16,9 @@ const MAX_TASKS: usize = 16;
 pub struct Eigenbasis {
     /// Eigenvalues, ascending, `[k]`, in 1 / squared unit of the mesh.
     pub eigenvalues: Vec<f64>,
-    /// Eigenvectors as columns, `[n, k]`.
+    /// Eigenvectors as columns, `[n, k]`, in 1 / unit of the mesh.
     pub eigenvectors: Matrix,
-    /// The lumped mass `A`: area of each vertex, `[n]`.
+    /// The lumped mass `A`: area of each vertex, `[n]`, in squared units of the mesh.
     pub mass: Vec<f64>,
 }
 
@@ -34,6 +34,9 @@ impl Eigenbasis {
     }
 
     /// The first `k` eigenpairs only.
+    ///
+    /// # Panics
+    /// If there are fewer than `k`.
     pub fn truncated(&self, k: usize) -> Self {
         Self {
             eigenvalues: self.eigenvalues[..k].to_vec(),
@@ -45,6 +48,9 @@ impl Eigenbasis {
     /// The first `k` eigenpairs of the shape scaled to unit area: eigenvalues, eigenvectors and mass without a unit.
     ///
     /// Functional maps are computed between such bases, so that a map does not depend on the size of either shape.
+    ///
+    /// # Panics
+    /// If there are fewer than `k`.
     pub fn at_unit_area(&self, k: usize) -> Self {
         self.in_unit(self.area(), k)
     }
@@ -56,6 +62,9 @@ impl Eigenbasis {
 
     /// The first `k` eigenpairs where an area of `area` (above 0, in squared units of the mesh) counts as 1. For a part of
     /// a shape it is the area of the whole, so that the eigenvalues of both are in one unit.
+    ///
+    /// # Panics
+    /// If there are fewer than `k`.
     pub fn in_unit(&self, area: f64, k: usize) -> Self {
         Self {
             eigenvalues: self.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),

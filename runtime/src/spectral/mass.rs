@@ -6,7 +6,7 @@ use crate::mesh::Mesh;
 const MIN_RELATIVE_AREA: f64 = 1e-8;
 
 /// The lumped barycentric mass `A`, the diagonal `[n]`: a third of the area of the triangles around each
-/// vertex, in squared units of the mesh. It sums to the area.
+/// vertex, in squared units of the mesh. It sums to the area, but for the floor below.
 ///
 /// Always positive, so that `W phi = lambda A phi` is a definite problem: a vertex of less than 1e-8 of the
 /// mean area (unreferenced, or in degenerate triangles only) gets that much.

@@ -90,12 +90,12 @@ impl SparseMatrix {
         &self.offsets
     }
 
-    /// Column of every stored entry.
+    /// Column of every stored entry, row by row.
     pub fn indices(&self) -> &[u32] {
         &self.indices
     }
 
-    /// Value of every stored entry.
+    /// Value of every stored entry, row by row.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -111,7 +111,7 @@ impl SparseMatrix {
         (0..self.n()).map(|i| self.row(i).filter(|&(j, _)| j == i).map(|(_, value)| value).sum()).collect()
     }
 
-    /// The product with the columns of `x`, `[n, q]`.
+    /// The product with the columns of `x`, `[n, q]`, as `[n, q]`.
     ///
     /// # Panics
     /// If `x` has not `n` rows, which is a bug of the caller.

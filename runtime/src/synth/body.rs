@@ -21,15 +21,18 @@ use super::{SynthError, SynthOptions, UNMATCHED};
 pub struct Body {
     /// The surface, closed unless damaged.
     pub mesh: Mesh,
-    /// Of every landmark of the species its vertex, or [`UNMATCHED`] where damage took it away.
+    /// Of every landmark of the species its vertex, `[n_landmarks]`, or [`UNMATCHED`] where damage took it away.
     pub landmarks: Vec<u32>,
-    /// Of every vertex the vertex of the template's dense surface ([`Template::rest_mesh`]) it is.
+    /// Of every vertex the vertex of the template's dense surface ([`Template::rest_mesh`]) it is, `[n]`.
     pub template_vertices: Vec<u32>,
 }
 
 impl Template {
     /// The individual with the given seed: body, pose, triangulation and damage are all drawn from it. The same seed
     /// and options give the same bytes, whatever the number of threads.
+    ///
+    /// # Errors
+    /// If an option is out of range.
     pub fn body(&self, seed: u64, options: &SynthOptions) -> Result<Body, SynthError> {
         options.check()?;
         let dense = self.individual(seed);
@@ -49,7 +52,7 @@ impl Template {
     }
 
     /// For every vertex of `source` the vertex of `target` nearest to it on the species' surface at rest, or
-    /// [`UNMATCHED`] where damage took that part of the target away. At landmarks the two points are the same.
+    /// [`UNMATCHED`] where damage took that part of the target away, `[n_source]`. At landmarks the two points are the same.
     ///
     /// # Panics
     /// If a body is of another species and names template vertices that this one does not have.
@@ -70,7 +73,7 @@ impl Template {
     }
 
     /// For every vertex of `source` the same point of `target`'s surface: a face and its barycentric coordinates, or
-    /// `None` where damage took it away. The point is found on the species' surface at rest.
+    /// `None` where damage took it away, `[n_source]`. The point is found on the species' surface at rest.
     ///
     /// # Panics
     /// As [`Template::ground_truth`].

@@ -15,11 +15,11 @@ use super::{Body, Species, SynthError, SynthOptions, Template, UNMATCHED};
 pub struct DatasetOptions {
     /// Species, each in a folder of its name; default all.
     pub species: Vec<Species>,
-    /// Individuals of every species, at least 2; default 40.
+    /// Individuals of every species, 2 to 16777215; default 40.
     pub per_species: usize,
     /// Share of the individuals of a species that are for validation, in [0, 0.9]; default 0.1.
     pub validation: f64,
-    /// Another seed, other individuals; below 2^32; default 0.
+    /// Another seed, other individuals; default 0.
     pub seed: u32,
     /// Triangulation and damage.
     pub body: SynthOptions,
@@ -85,6 +85,9 @@ pub fn split_of(species: Species, individual: usize, options: &DatasetOptions) -
 ///
 /// The manifest is written last: a folder that has it is complete. `progress` is told after each shape how many of how
 /// many are done.
+///
+/// # Errors
+/// If an option is out of range, or a file or folder cannot be written.
 pub fn write_dataset(
     folder: &Path,
     options: &DatasetOptions,

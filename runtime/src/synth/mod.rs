@@ -66,6 +66,9 @@ pub enum SynthError {
 }
 
 /// The individual of `species` with the given seed; to make many of one species, build its [`Template`] once.
+///
+/// # Errors
+/// If an option is out of range.
 pub fn generate(species: Species, seed: u64, options: &SynthOptions) -> Result<Body, SynthError> {
     options.check()?;
     Template::new(species).body(seed, options)

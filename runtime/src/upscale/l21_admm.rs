@@ -19,9 +19,9 @@ use thiserror::Error;
 /// Settings of [`l21_functional_map`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct AdmmOptions {
-    /// At most so many iterations. Range 1 and up, default 200.
+    /// At most so many iterations. Range 0 (least squares) and up, default 200.
     pub max_iterations: usize,
-    /// Both residuals must fall below this, relative to the norms of what they compare. Default 1e-4.
+    /// Both residuals must fall below this, relative to the norms of what they compare. Above 0, default 1e-4.
     pub tolerance: f64,
 }
 
@@ -36,15 +36,16 @@ impl Default for AdmmOptions {
 pub struct AdmmInfo {
     /// Iterations done.
     pub iterations: usize,
-    /// Whether both residuals fell below the tolerance. If not, the map is still the best iterate.
+    /// Whether both residuals fell below the tolerance, or least squares fit already. If not, the map is the last iterate.
     pub converged: bool,
     /// The objective, `|| C F^ - G^ ||_{2,1}`, at the end.
     pub objective: f64,
     /// The objective of the least-squares solution that the iteration started from.
     pub initial_objective: f64,
-    /// `|| X M - Y - Z ||_F` relative to the norms of its terms.
+    /// `|| X M - Y - Z ||_F` relative to the largest norm of its three terms.
     pub primal_residual: f64,
-    /// `rho || X^T (Z - Z_before) ||_F` relative to the norm of the multipliers.
+    /// `|| Z - Z_before ||_F` relative to the norm of the scaled multipliers `U`: the bound of the dual residual, without the
+    /// factor `X^T`.
     pub dual_residual: f64,
 }
 
@@ -84,6 +85,9 @@ pub enum UpscaleError {
 ///
 /// `phi` is `[m, k_source]` and `psi` `[m, k_target]`, as [`super::delta_coefficients`] gives them. The result does not depend
 /// on the number of threads.
+///
+/// # Errors
+/// If the numbers of rows differ, are fewer than `k_source`, or the rows of `phi` do not determine the map.
 pub fn l21_functional_map(
     phi: &Matrix,
     psi: &Matrix,

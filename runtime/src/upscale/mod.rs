@@ -17,9 +17,12 @@ use crate::spectral::Eigenbasis;
 
 /// The values of the eigenfunctions at the matched vertices, `[m, k_source]` and `[m, k_target]`.
 ///
-/// Row `j` holds the Fourier coefficients of the delta function at match `j`. A delta is given unit mass, so its coefficients
-/// are `phi(x_j)` without the vertex's area: the area of a single vertex is an accident of the tessellation, and every match
-/// shall count the same.
+/// `matches` are pairs (source vertex, target vertex). Row `j` holds the Fourier coefficients of the delta function at
+/// match `j`. A delta is given unit mass, so its coefficients are `phi(x_j)` without the vertex's area: the area of a
+/// single vertex is an accident of the tessellation, and every match shall count the same.
+///
+/// # Panics
+/// If a match names a vertex that does not exist.
 pub fn delta_coefficients(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
@@ -31,9 +34,17 @@ pub fn delta_coefficients(
 
 /// The point map of the full shapes, of a functional map `c`, `[k_target, k_source]`, of theirs and the matches that it was found from.
 ///
-/// For each source vertex `x` the target vertex whose row of `psi` is nearest to `C phi(x)` plus what `C` misses at the matches
-/// near `x`, as far as these are right. The paper does without the latter; then the map of the full shapes is as smooth as
-/// `k` eigenfunctions, and worse than that of the decimated ones. `vertices` are the positions of the source, `[n_source]`.
+/// For each source vertex `x` the target vertex whose row of `psi` is nearest to `C phi(x)` plus what `C` misses at the
+/// matches near `x`, as far as these are right. The paper does without the latter; then the map of the full shapes is as
+/// smooth as `k` eigenfunctions, and worse than that of the decimated ones. `vertices` are the positions of the source,
+/// `[n_source, 3]`; `matches` are pairs (source vertex, target vertex). The confidence is the cosine of the angle between
+/// what is compared.
+///
+/// # Errors
+/// If an entry of `c` or a basis is not finite.
+///
+/// # Panics
+/// If `c` or `vertices` does not fit the bases, or a match names a vertex that does not exist.
 pub fn full_point_map(
     c: &Matrix,
     basis_source: &Eigenbasis,

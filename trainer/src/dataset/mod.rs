@@ -122,6 +122,9 @@ pub const MISSING: u32 = u32::MAX;
 
 impl Dataset {
     /// Recognises the layout of a folder.
+    ///
+    /// # Errors
+    /// If the folder has no known layout, or it or its manifest cannot be read.
     pub fn open(folder: &Path) -> Result<Self, DatasetError> {
         let manifest = folder.join(manifest::FILE_NAME);
         let (layout, mut shapes) = if manifest.is_file() {
@@ -147,17 +150,26 @@ impl ShapeEntry {
         self.whole.is_some()
     }
 
-    /// For a part, the area of the whole, in squared units.
+    /// For a part, the area of the whole, in squared units of its mesh.
+    ///
+    /// # Errors
+    /// If the whole cannot be read.
     pub fn whole_area(&self) -> Result<Option<f64>, DatasetError> {
         self.whole.as_ref().map(|whole| Ok(read_mesh(whole)?.mesh.area())).transpose()
     }
 
     /// Reads the mesh.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
     pub fn read(&self) -> Result<Mesh, DatasetError> {
         Ok(read_mesh(&self.mesh)?.mesh)
     }
 
-    /// The vertex of `mesh` of every point of the group, [`MISSING`] where the shape lacks it.
+    /// The vertex of `mesh` of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
+    ///
+    /// # Errors
+    /// If the correspondence cannot be read or does not fit the mesh.
     pub fn points(&self, mesh: &Mesh) -> Result<Vec<u32>, DatasetError> {
         let n = mesh.n_vertices();
         match &self.correspondence {
@@ -196,7 +208,11 @@ fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
 }
 
 impl ShapeEntry {
-    /// The vertex of the left-right mirror image of every point, where a file `NAME.sym.vts` beside `NAME.vts` says.
+    /// The vertex of the left-right mirror image of every point, `[points]`, where a file `NAME.sym.vts` beside `NAME.vts`
+    /// says.
+    ///
+    /// # Errors
+    /// If that file cannot be read or does not fit the mesh.
     pub fn mirrored_points(&self, mesh: &Mesh) -> Result<Option<Vec<u32>>, DatasetError> {
         let Correspondence::Vts(path) = &self.correspondence else { return Ok(None) };
         let mirrored = path.with_extension("sym.vts");

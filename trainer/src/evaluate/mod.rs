@@ -49,9 +49,9 @@ pub enum MapSource {
 pub struct EvaluateOptions {
     /// Whether a left-right mirrored map counts as right where the dataset knows the mirrored ground truth. Default false.
     pub symmetric: bool,
-    /// Ranks of the CMC curve, 0: no figures of descriptors. Default 100.
+    /// Ranks of the CMC curve; 0: no figures of descriptors. Default 100.
     pub ranks: usize,
-    /// Points of a pair that descriptors are compared at, evenly spread. Default 1000.
+    /// Points of a pair that descriptors are compared at, at most, evenly spread; 1 or more. Default 1000.
     pub points: usize,
 }
 
@@ -89,14 +89,14 @@ pub struct PairResult {
     pub mirrored: bool,
     /// Seconds from described shapes to the map; 0 for map files.
     pub seconds: f64,
-    /// The map.
+    /// The map, in the vertices of the files.
     pub map: PointMap,
 }
 
 /// How well descriptors tell the right match from the others, over all pairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescriptorFigures {
-    /// Probability that the right match is among the k nearest, k from 1, averaged over pairs.
+    /// Probability that the right match is among the k nearest, k from 1, averaged over pairs, `[ranks]`.
     pub cmc: Vec<f64>,
     /// Distances of correct matches, over the mean distance of wrong ones, so that scales do not matter.
     pub distances: Vec<f32>,
@@ -107,7 +107,7 @@ pub struct DescriptorFigures {
 pub struct MeanSummary {
     /// Mean error over sqrt(area).
     pub mean: f64,
-    /// Median over the pairs of their mean errors.
+    /// Median over the pairs of their mean errors, the upper one of two.
     pub median: f64,
     /// Share of exact matches.
     pub exact: f64,
@@ -115,7 +115,7 @@ pub struct MeanSummary {
     pub within_005: f64,
     /// Area under the curve.
     pub auc: f64,
-    /// Share of vertices matched.
+    /// Share of vertices matched, from 0 to 1.
     pub coverage: f64,
     /// Largest error of all pairs.
     pub worst: f64,
@@ -191,6 +191,10 @@ impl MethodResult {
 }
 
 /// Matches all `pairs` (indices into the dataset's shapes) with all methods. The observer hears of every pair.
+///
+/// # Errors
+/// If there are no pairs, a shape or a map file cannot be read or does not fit its pair, a model cannot be loaded, or a pair
+/// cannot be matched.
 pub fn evaluate(
     dataset: &Dataset,
     pairs: &[(usize, usize)],

@@ -35,6 +35,9 @@ pub struct Chapter<'a> {
 impl Chapter<'_> {
     /// Writes `summary.csv`, `pairs.csv`, `curves.csv`, `curves.svg`, where there are descriptors `cmc.svg` and
     /// `histogram.svg`, and `maps/METHOD/SOURCE__TARGET.txt`.
+    ///
+    /// # Errors
+    /// If a file or folder cannot be written.
     pub fn write_files(&self, folder: &Path) -> Result<(), EvaluateError> {
         let write = |name: &str, text: String| {
             write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()))
@@ -57,6 +60,9 @@ impl Chapter<'_> {
     }
 
     /// The chapter as a section of an HTML page.
+    ///
+    /// # Errors
+    /// If a mesh of a pictured pair cannot be read.
     pub fn section(&self) -> Result<Section, EvaluateError> {
         let mut blocks = vec![Block::Text(self.text.into()), self.table()];
         blocks.extend(self.charts().into_iter().map(|(_, chart)| Block::Svg(chart.to_svg())));
@@ -208,6 +214,9 @@ impl Chapter<'_> {
 }
 
 /// Writes one HTML page.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_html(path: &Path, title: &str, sections: Vec<Section>) -> Result<(), IoError> {
     let html = HtmlReport { title: title.into(), sections }.to_html();
     write_atomically(path, |out| out.write_all(html.as_bytes()))

@@ -34,11 +34,11 @@ pub enum ExportError {
 /// Where a model comes from, for its metadata.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelOrigin {
-    /// What it was trained on; `None`: the names of the dataset folders.
+    /// What it was trained on; `None`, the default: the names of the dataset folders.
     pub training_set: Option<String>,
-    /// Licence of the weights.
+    /// Licence of the weights. Default `unspecified`.
     pub license: String,
-    /// Revision of the source.
+    /// Revision of the source. Default: the version of this crate.
     pub commit: String,
 }
 
@@ -72,12 +72,18 @@ pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata 
 }
 
 /// Writes a model file.
+///
+/// # Errors
+/// As [`to_onnx`], and if the file cannot be written.
 pub fn export(network: &Network, metadata: &ModelMetadata, path: &Path) -> Result<(), ExportError> {
     let bytes = to_onnx(network, metadata)?;
     Ok(write_atomically(path, |out| out.write_all(&bytes))?)
 }
 
 /// The content of a model file.
+///
+/// # Errors
+/// If the network is not 352 wide, or its parameters cannot be read from the device.
 pub fn to_onnx(network: &Network, metadata: &ModelMetadata) -> Result<Vec<u8>, ExportError> {
     let options = network.options();
     if options.width != WIDTH {

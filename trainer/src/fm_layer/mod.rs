@@ -29,13 +29,13 @@ pub enum FmSolver {
         /// Added to the diagonal, relative to its mean; at least 0, 0 in the paper.
         #[serde(default)]
         ridge: f64,
-        /// Condition number of `F F^T` above which the truncated pseudo-inverse is used; default 1e12.
+        /// Condition number of `F F^T` above which the truncated pseudo-inverse is used; above 1, default 1e12.
         #[serde(default = "default_max_condition")]
         max_condition: f64,
     },
     /// Rows regularised by the resolvent mask (Ren et al. 2019).
     Regularized {
-        /// Weight of the mask relative to the mean diagonal of `F F^T`; above 0, default 0.1.
+        /// Weight of the mask relative to the mean diagonal of `F F^T`; 0 or more, default 0.1.
         #[serde(default = "default_mask_weight")]
         weight: f64,
     },

@@ -15,13 +15,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct FunctionalMap {
     /// `C` `[k_target, k_source]`, differentiable, of the type of the descriptors.
     pub map: Tensor,
-    /// Condition number of `F F^T` (the square of that of `F`); infinite where it is singular.
+    /// Condition number of `F F^T` (the square of that of `F`), without mask or ridge; infinite where it is singular.
     pub condition: f64,
 }
 
 /// Solves for the functional map of the spectral descriptors `source` `[k_source, q]` and `target` `[k_target, q]`, both f32
 /// or both f64. `mask` is [`fmnet::fmap::resolvent_mask`], `[k_target, k_source]`; the least squares ignore
 /// it. On a GPU the small systems are copied to the host and solved there.
+///
+/// # Errors
+/// If the tensors do not fit together, or the descriptors are not finite or those of the source all zero ([`FmLayerError`]).
 pub fn functional_map(
     source: &Tensor,
     target: &Tensor,

@@ -109,7 +109,7 @@ impl ParameterInfo {
     }
 }
 
-/// Mean and variance `[width]` that a normalisation uses.
+/// Mean and variance, `[width]` each, that a normalisation uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BatchMoments {
     /// Mean of each channel.
@@ -143,7 +143,7 @@ pub struct Network {
 }
 
 impl Network {
-    /// A network with seeded initial parameters.
+    /// A network with seeded initial parameters; fails where `blocks`, `width` or `epsilon` is out of range.
     pub fn new(options: NetworkOptions, device: &Device) -> Result<Self> {
         if options.blocks == 0 || options.width == 0 || options.epsilon <= 0.0 {
             bail!("the network needs blocks >= 1, width >= 1 and epsilon > 0; got {options:?}");
@@ -192,22 +192,23 @@ impl Network {
         infos
     }
 
-    /// Copies the flat parameters out.
+    /// Copies the flat parameters out, `[p]`.
     pub fn parameter_values(&self) -> Result<Vec<f32>> {
         self.flat.as_tensor().to_vec1()
     }
 
-    /// Replaces the flat parameters.
+    /// Replaces the flat parameters, `[p]`; fails where there are more or fewer.
     pub fn set_parameter_values(&mut self, values: &[f32]) -> Result<()> {
         self.flat.set(&Tensor::from_slice(values, values.len(), self.flat.device())?)
     }
 
-    /// The running statistics: of each block, its two normalisations. Used with [`Normalization::Running`] only.
+    /// The running statistics, `[blocks, 2]`: of each block, its two normalisations. Used with [`Normalization::Running`]
+    /// only.
     pub fn running_statistics(&self) -> &[[BatchMoments; 2]] {
         &self.running
     }
 
-    /// Replaces the running statistics.
+    /// Replaces the running statistics; fails where they are not of as many blocks or of another width.
     pub fn set_running_statistics(&mut self, statistics: Vec<[BatchMoments; 2]>) -> Result<()> {
         let fits =
             |m: &BatchMoments| m.mean.len() == self.options.width && m.variance.len() == self.options.width;
@@ -223,7 +224,7 @@ impl Network {
     }
 
     /// Descriptors of the shapes at test time, from their inputs `[n, width]`; no gradient. The rows of all shapes lie one
-    /// below the other.
+    /// below the other, `[sum of n, width]`. Fails where a shape has no rows or another width.
     pub fn forward(&self, shapes: &[Tensor]) -> Result<Tensor> {
         let running = self.options.normalization == Normalization::Running;
         let (out, _) = self.run(shapes, running.then_some(self.running.as_slice()), false)?;

@@ -15,7 +15,7 @@ const FAUST_STEPS: u64 = 20_000;
 const SCAN_STEPS: u64 = 100_000;
 const PARTIAL_STEPS: u64 = 1_000;
 
-/// The experiment of a name.
+/// The experiment of a name, one of [`NAMES`]; `None` for others.
 pub fn experiment(name: &str, settings: &Settings) -> Option<Experiment> {
     match name {
         "faust-synthetic" => Some(faust_synthetic(settings)),

@@ -174,6 +174,9 @@ pub struct Observers<'a> {
 }
 
 /// Runs an experiment and gives the path of its report, `OUT/NAME/report.html`.
+///
+/// # Errors
+/// If data cannot be read or generated, a training fails or is stopped, or the evaluation or the report fails.
 pub fn run(
     experiment: &Experiment,
     settings: &Settings,

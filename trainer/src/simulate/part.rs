@@ -65,6 +65,9 @@ impl Default for PartOptions {
 
 impl PartOptions {
     /// Whether every option is in its range.
+    ///
+    /// # Errors
+    /// If one is not: the first.
     pub fn check(&self) -> Result<(), SimulateError> {
         check("kinds", !self.kinds.is_empty(), &self.kinds, "holes, cuts or both")?;
         check("min-area", (0.05..=0.95).contains(&self.min_area), self.min_area, "from 0.05 to 0.95")?;
@@ -91,6 +94,9 @@ const TRIES: usize = 200;
 
 /// A connected part of `mesh`, whose share of the area is uniform in the range of the options as far as the shape allows.
 /// `index` is the part's number: another one, another cut.
+///
+/// # Errors
+/// If an option is out of range, or no part of such a size was found in 200 tries.
 pub fn cut_part(
     mesh: &Mesh,
     kind: PartKind,

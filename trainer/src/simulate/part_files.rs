@@ -25,6 +25,10 @@ struct Job<'a> {
 /// Each group is a class, with at least three shapes in vertex to vertex correspondence, as in TOSCA: the first by name is
 /// the whole, in its pose; the first half of the others gives the 10 training parts, which come first, and the second half the
 /// test parts, so that these share neither pose nor cut with the training parts.
+///
+/// # Errors
+/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be read or
+/// cut, or a file cannot be written.
 pub fn write_parts(
     dataset: &Dataset,
     out: &Path,

@@ -97,6 +97,9 @@ impl Default for ScanOptions {
 
 impl ScanOptions {
     /// Whether every option is in its range.
+    ///
+    /// # Errors
+    /// If one is not: the first.
     pub fn check(&self) -> Result<(), SimulateError> {
         let vertices = (500..=60_000).contains(&self.vertices);
         check("vertices", vertices, self.vertices, "from 500 to 60000")?;
@@ -122,6 +125,9 @@ const TURN: f64 = 0.4;
 ///
 /// The registration may pass through itself. The scan may have holes, several components and vertices that are not manifold;
 /// each vertex of the registration corresponds with the nearest vertex of the scan, where there is one near.
+///
+/// # Errors
+/// If an option is out of range, the surface is not closed or encloses nothing, or it cannot be decimated.
 pub fn simulate_scan(registration: &Mesh, options: &ScanOptions, index: u64) -> Result<Mesh, SimulateError> {
     options.check()?;
     closed(registration)?;

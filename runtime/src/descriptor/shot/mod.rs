@@ -129,6 +129,9 @@ pub enum ShotError {
 /// Rigid motion and scaling of the mesh, and the order of its vertices, change nothing but rounding; where the
 /// neighbourhood has no unique frame (a perfectly regular or symmetric one), rounding decides. Vertices on no face
 /// with an area are nobody's neighbour. The result does not depend on the number of threads.
+///
+/// # Errors
+/// If an option is out of range, or the mesh has no area, or one that is not finite.
 pub fn shot(mesh: &Mesh, options: &ShotOptions) -> Result<(Matrix<f32>, ShotInfo), ShotError> {
     options.validate()?;
     let area = mesh.area();

@@ -133,6 +133,9 @@ pub enum RepairError {
 ///
 /// Left alone are holes, self-intersections, the seam of a surface that cannot be oriented, and slivers that have some
 /// area: the Laplacian has to bear large cotangents of either sign there.
+///
+/// # Errors
+/// If there are no faces, none of them has an area, or an option is out of range.
 pub fn repair(mesh: &Mesh, options: &RepairOptions) -> Result<Repaired, RepairError> {
     if !(0.0..=1.0).contains(&options.min_component_area) {
         return Err(RepairError::MinComponentArea { value: options.min_component_area });

@@ -43,7 +43,8 @@ pub fn icosphere(subdivisions: u32) -> Mesh {
     project(sphere_hull(&vertices), subdivisions)
 }
 
-/// The unit square in the plane z = 0, seen from above, in `nx * ny` cells of two triangles; `(nx + 1) * (ny + 1)` vertices.
+/// The unit square in the plane z = 0, seen from above, in `nx * ny` cells (1 or more each way) of two triangles;
+/// `(nx + 1) * (ny + 1)` vertices.
 pub fn grid(nx: usize, ny: usize) -> Mesh {
     let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     let mut vertices = Vec::with_capacity((nx + 1) * (ny + 1));
@@ -60,7 +61,8 @@ pub fn grid(nx: usize, ny: usize) -> Mesh {
     build(vertices, faces)
 }
 
-/// A torus about the z axis: a ring of radius 1, the tube of radius `tube_radius`; `n_ring * n_tube` vertices (both at least 3).
+/// A torus about the z axis: a ring of radius 1, the tube of radius `tube_radius` (above 0, below 1);
+/// `n_ring * n_tube` vertices (both at least 3).
 pub fn torus(n_ring: usize, n_tube: usize, tube_radius: f64) -> Mesh {
     let at = |i: usize, j: usize| ((i % n_ring) * n_tube + j % n_tube) as u32;
     let mut vertices = Vec::with_capacity(n_ring * n_tube);

@@ -8,7 +8,7 @@ use crate::mesh::union_find::UnionFind;
 pub struct Fans {
     /// `[3 m]` the fan of corner `3 f + c`; [`NONE`] where face `f` repeats a vertex.
     pub of_corner: Vec<u32>,
-    /// The vertex of each fan, ascending; the fans of one vertex are in the order of their first corner.
+    /// The vertex of each fan, `[n_fans]`, ascending; the fans of one vertex are in the order of their first corner.
     pub vertex_of_fan: Vec<u32>,
 }
 

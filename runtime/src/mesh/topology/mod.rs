@@ -17,7 +17,7 @@ use super::Mesh;
 /// Stands for "none" in label arrays: a vertex of no component, a corner of no fan, a half-edge of no edge.
 pub const NONE: u32 = u32::MAX;
 
-/// The edges of a mesh and the faces around each.
+/// The edges of a mesh and the faces around each. Queries panic where there is no such edge or half-edge.
 #[derive(Clone, Debug)]
 pub struct Topology<'a> {
     faces: &'a [[u32; 3]],
@@ -77,7 +77,7 @@ impl<'a> Topology<'a> {
         topology
     }
 
-    /// The edges as `[i, j]` with `i < j`, in lexicographic order.
+    /// The edges as `[i, j]` with `i < j`, in lexicographic order, `[n_edges, 2]`.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
     }
@@ -103,23 +103,24 @@ impl<'a> Topology<'a> {
         [face[corner], face[(corner + 1) % 3]]
     }
 
-    /// Edges of more than two faces.
+    /// Edges of more than two faces, as places in [`Topology::edges`], ascending.
     pub fn non_manifold_edges(&self) -> Vec<u32> {
         self.edges_where(|half_edges| half_edges.len() > 2)
     }
 
-    /// Edges of exactly one face.
+    /// Edges of exactly one face, as places in [`Topology::edges`], ascending.
     pub fn boundary_edges(&self) -> Vec<u32> {
         self.edges_where(|half_edges| half_edges.len() == 1)
     }
 
-    /// Edges of two faces that run along it in the same direction, so that one of the two is the wrong way round.
+    /// Edges of two faces that run along it in the same direction, so that one of the two is the wrong way round; as places
+    /// in [`Topology::edges`], ascending.
     pub fn inconsistent_edges(&self) -> Vec<u32> {
         self.edges_where(|h| h.len() == 2 && self.ends(h[0])[0] == self.ends(h[1])[0])
     }
 
     /// Vertices with more than one fan of faces, where surfaces touch in a point. The ends of non-manifold edges are not
-    /// counted.
+    /// counted. Ascending.
     pub fn non_manifold_vertices(&self) -> Vec<u32> {
         let mut n_fans = vec![0u32; self.n_vertices];
         for &vertex in &self.fans().vertex_of_fan {

@@ -83,6 +83,9 @@ pub struct NearestRows {
 
 impl NearestRows {
     /// Prepares `targets`, `[n_targets, d]`.
+    ///
+    /// # Errors
+    /// If there are no targets, more than 32 bits can name, or an entry is not finite.
     pub fn new(targets: &Matrix) -> Result<Self, SearchError> {
         let n_targets = targets.rows();
         if n_targets == 0 {
@@ -106,6 +109,9 @@ impl NearestRows {
     }
 
     /// For every row of `queries`, `[n_queries, d]`, the nearest target by Euclidean distance.
+    ///
+    /// # Errors
+    /// If the width is not that of the targets, or an entry is not finite.
     pub fn nearest(&self, queries: &Matrix) -> Result<Nearest, SearchError> {
         if queries.cols() != self.width() {
             return Err(SearchError::WidthMismatch { queries: queries.cols(), targets: self.width() });
@@ -118,6 +124,9 @@ impl NearestRows {
 /// For every row of `queries`, `[n_queries, d]`, the nearest row of `targets`, `[n_targets, d]`.
 ///
 /// Exact, ties go to the lowest index, the same for any number of threads.
+///
+/// # Errors
+/// As [`NearestRows::new`] and [`NearestRows::nearest`].
 pub fn nearest_rows(queries: &Matrix, targets: &Matrix) -> Result<Nearest, SearchError> {
     NearestRows::new(targets)?.nearest(queries)
 }

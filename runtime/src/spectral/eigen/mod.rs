@@ -46,7 +46,7 @@ pub struct EigenOptions {
     /// Dimension of the subspace at which the iteration restarts. Memory is `8 n` bytes for each. Default:
     /// about `2.3 k + 128`, with which most meshes need no restart; less than `k + 32` counts as that.
     pub subspace: Option<usize>,
-    /// Restarts until the solver gives up. Default 50.
+    /// Restarts until the solver gives up. From 0; default 50.
     pub max_restarts: usize,
     /// Count the eigenvalues by another factorisation, to be sure that none is missed. Default true; costs
     /// some 5 % of the time.
@@ -73,7 +73,7 @@ pub struct EigenInfo {
     pub components: usize,
     /// Block steps of the Lanczos iteration; 0 for the dense solver.
     pub iterations: usize,
-    /// Vectors that the factorised system was solved for.
+    /// Vectors that the factorised system was solved for in these steps.
     pub solves: usize,
     /// Times that the iteration restarted.
     pub restarts: usize,
@@ -180,8 +180,8 @@ pub enum EigenError {
 /// differ by the scale and rounding only.
 ///
 /// # Errors
-/// If the mesh has no area, `k` is 0 or too large for the mesh, or the iteration does not converge; see
-/// [`EigenError`].
+/// If the mesh has no area, `k` is 0 or too large for the mesh (more than `n` up to 3000 vertices, than about `n / 6`
+/// beyond), an option is out of range, or the iteration does not converge; see [`EigenError`].
 pub fn eigenbasis(
     laplacian: &Laplacian,
     k: usize,
