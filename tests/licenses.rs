@@ -15,7 +15,6 @@ const ALLOWED: [&str; 14] = [
     "CC0-1.0",
     "ISC",
     "MIT",
-    "MIT-0",
     "MPL-2.0",
     "Unicode-3.0",
     "Unlicense",
