@@ -117,7 +117,7 @@ pub(crate) struct MatchArgs {
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
     /// The source is a part of a shape, with holes or cut off, and the target the whole, in whatever pose; both in the same
-    /// unit of length
+    /// unit of length. Parts determine fewer eigenfunctions: try -k 70 where the map is poor
     #[arg(long)]
     pub(crate) partial: bool,
     /// Write the functional map, [k of target, k of source]
