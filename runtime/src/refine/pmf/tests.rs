@@ -228,6 +228,7 @@ fn options_out_of_range_are_errors() {
         PmfOptions { neighbors_end: 3, ..default.clone() },
         PmfOptions { neighbors_start: 5, ..default.clone() },
         PmfOptions { candidates: 0, ..default.clone() },
+        PmfOptions { heat_rounds: 0, local_rounds: 0, ..default.clone() },
     ] {
         assert!(matches!(
             pmf(&map, &basis, &basis, PmfHints::default(), &options),
