@@ -104,8 +104,9 @@ impl Cache {
     pub fn put(&self, kind: &str, key: CacheKey, payload: &[u8]) -> Result<(), IoError> {
         write_atomically(&self.path(kind, key), |out| {
             out.write_all(MAGIC)?;
-            out.write_all(&FORMAT_VERSION.to_le_bytes())?;
-            out.write_all(&(payload.len() as u64).to_le_bytes())?;
+            // In the payload's byte order, so that a machine of the other one takes the entry as damaged.
+            out.write_all(&FORMAT_VERSION.to_ne_bytes())?;
+            out.write_all(&(payload.len() as u64).to_ne_bytes())?;
             out.write_all(&checksum(key, payload))?;
             out.write_all(payload)
         })
@@ -136,7 +137,7 @@ fn checked_payload(mut bytes: Vec<u8>, key: CacheKey) -> Result<Vec<u8>, String>
     Ok(bytes)
 }
 
-/// Writes plain values and arrays one after another, in the byte order of the machine: a folder is not for machines of both.
+/// Writes plain values and arrays one after another, in the byte order of the machine.
 #[derive(Default)]
 pub struct Encoder(Vec<u8>);
 
@@ -241,6 +242,11 @@ mod tests {
         cache.put("shape", key, &[1, 2, 3, 4]).unwrap();
         let path = cache.path("shape", key);
         let good = std::fs::read(&path).unwrap();
+        let mut other_order = good.clone();
+        other_order[8..12].reverse();
+        other_order[12..20].reverse();
+        std::fs::write(&path, &other_order).unwrap();
+        assert!(matches!(cache.get("shape", key), Lookup::Damaged(_)), "written in the other byte order");
         for len in 0..good.len() {
             std::fs::write(&path, &good[..len]).unwrap();
             assert!(matches!(cache.get("shape", key), Lookup::Damaged(_)), "truncated to {len} bytes");

@@ -52,10 +52,29 @@ pub enum Error {
     /// A stage would take more memory than there is.
     #[error(transparent)]
     Memory(#[from] MemoryError),
-    /// Any of these, on a known shape.
+    /// The area of the whole that a part belongs to is out of range.
+    #[error(
+        "whole_area is {area}, but must be a finite number above 0: the area of the whole shape in squared units of the mesh"
+    )]
+    WholeArea {
+        /// The area given.
+        area: f64,
+    },
+    /// A shape was described with too few eigenpairs to be matched, by another matcher.
+    #[error(
+        "described with {found} eigenpairs, but the matcher takes {expected}; describe the shape with the matcher that \
+         matches it"
+    )]
+    TooFewEigenpairs {
+        /// Eigenpairs of the shape.
+        found: usize,
+        /// Eigenpairs that the matcher takes.
+        expected: usize,
+    },
+    /// Any of these, on a known shape or pair.
     #[error("{shape}: {source}")]
     InShape {
-        /// The shape's name.
+        /// The name of the shape, or of both as `source -> target`.
         shape: String,
         /// What happened.
         source: Box<Error>,
@@ -63,9 +82,12 @@ pub enum Error {
 }
 
 impl Error {
-    /// The same error, naming the shape it happened on.
+    /// The same error, naming the shape or pair it happened on; one that names a shape already stays as it is.
     pub fn in_shape(self, shape: &str) -> Self {
-        Self::InShape { shape: shape.to_string(), source: Box::new(self) }
+        match self {
+            Self::InShape { .. } => self,
+            other => Self::InShape { shape: shape.to_string(), source: Box::new(other) },
+        }
     }
 
     /// Whether the program or the machine failed (a file that cannot be written, too little memory, a solver that did

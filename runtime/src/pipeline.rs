@@ -218,7 +218,7 @@ impl Matcher {
     ///
     /// # Errors
     /// If the mesh has no surface left after repair, is too small for `k` eigenfunctions or too large for the memory, if the
-    /// radius is out of range, the network fails, or the cache cannot be written; all but the last two name the shape.
+    /// radius is out of range, the network fails, or the cache cannot be written; it names the shape.
     pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
         self.describe_by(&self.options_for(mesh), name, mesh, observer)
     }
@@ -228,7 +228,7 @@ impl Matcher {
     /// as a part.
     ///
     /// # Errors
-    /// As [`Matcher::describe`].
+    /// As [`Matcher::describe`], and if `whole_area` is out of range.
     pub fn describe_part(
         &self,
         name: &str,
@@ -247,8 +247,9 @@ impl Matcher {
         mesh: &Mesh,
         observer: Observer,
     ) -> Result<DescribedShape, Error> {
+        let in_shape = |e: Error| e.in_shape(name);
         let cache = self.cache.as_ref();
-        let shape = Shape::process_cached(name, mesh, options, cache, observer)?;
+        let shape = Shape::process_cached(name, mesh, options, cache, observer).map_err(in_shape)?;
         let key = Shape::cache_key(mesh, options);
         let Some(network) = &self.network else {
             let descriptors = shape.shot.clone();
@@ -261,11 +262,12 @@ impl Matcher {
         {
             return Ok(DescribedShape { shape, descriptors, key });
         }
-        let descriptors = timed(observer, name, "network", || network.descriptors(&shape.shot))?;
+        let descriptors = timed(observer, name, "network", || network.descriptors(&shape.shot))
+            .map_err(|e| in_shape(e.into()))?;
         if let Some(cache) = cache {
             let mut out = Encoder::default();
             out.matrix(&descriptors);
-            cache.put("descriptors", network_key, &out.finish())?;
+            cache.put("descriptors", network_key, &out.finish()).map_err(|e| in_shape(e.into()))?;
         }
         Ok(DescribedShape { shape, descriptors, key })
     }
@@ -281,21 +283,35 @@ impl Matcher {
     /// described as one.
     ///
     /// # Errors
-    /// If the descriptors are not finite, a stage would take more memory than there is, the refinement fails, or the
-    /// matches are too few to be upscaled.
-    ///
-    /// # Panics
-    /// If a shape was described with fewer eigenfunctions than [`Matcher::k`], by another matcher.
+    /// If a shape was described with fewer eigenfunctions than [`Matcher::k`], by another matcher, the descriptors are not
+    /// finite, a stage would take more memory than there is, the refinement fails, or the matches are too few to be
+    /// upscaled; it names the shape or the pair.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
         target: &DescribedShape,
         observer: Observer,
     ) -> Result<Match, Error> {
+        for shape in [&source.shape, &target.shape] {
+            if shape.basis.k() < self.k {
+                let (found, expected) = (shape.basis.k(), self.k);
+                return Err(Error::TooFewEigenpairs { found, expected }.in_shape(&shape.name));
+            }
+        }
         let pair = format!("{} -> {}", source.shape.name, target.shape.name);
+        self.match_pair(source, target, &pair, observer).map_err(|e| e.in_shape(&pair))
+    }
+
+    fn match_pair(
+        &self,
+        source: &DescribedShape,
+        target: &DescribedShape,
+        pair: &str,
+        observer: Observer,
+    ) -> Result<Match, Error> {
         let (basis_source, basis_target) = (source.shape.unit_basis(self.k), target.shape.unit_basis(self.k));
         let solver = if source.shape.whole_area.is_some() { self.part_solver } else { self.solver };
-        let (functional_map, functional_map_info) = timed(observer, &pair, "functional map", || {
+        let (functional_map, functional_map_info) = timed(observer, pair, "functional map", || {
             let (f, g) =
                 (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
             functional_map(&basis_source, &basis_target, &f, &g, solver)
@@ -312,12 +328,12 @@ impl Matcher {
             basis_target.k().max(self.shape_options.k),
         );
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
-        let raw = timed(observer, &pair, "point map", || {
+        let raw = timed(observer, pair, "point map", || {
             recover_by(Comparison::suiting(solver), &functional_map, &basis_source, &basis_target)
         })?;
-        let (map, pmf_info) = self.refine(source, target, &functional_map, raw, &pair, observer)?;
+        let (map, pmf_info) = self.refine(source, target, &functional_map, raw, pair, observer)?;
         drop(reserved);
-        let (map, upscale_info) = self.upscale(source, target, map, &pair, observer)?;
+        let (map, upscale_info) = self.upscale(source, target, map, pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
         Ok(Match { map, functional_map, functional_map_info, pmf_info, upscale_info })
     }
@@ -455,4 +471,37 @@ fn cached_basis(cache: &Cache, key: CacheKey, observer: Observer) -> Option<Eige
     let bytes = cache.fetch("full-basis", key, observer)?;
     let mut input = Decoder::new(&bytes);
     Some(Eigenbasis { eigenvalues: input.slice()?, mass: input.slice()?, eigenvectors: input.matrix()? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::ignore;
+    use crate::mesh::shapes::bumpy_sphere;
+
+    fn matcher(k: usize) -> Matcher {
+        let (descriptor, k) = (DescriptorKind::Shot, Some(k));
+        Matcher::new(&MatchOptions { descriptor, k, ..MatchOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn errors_of_a_pair_name_what_they_are_of() {
+        let (mesh, matcher, other) = (bumpy_sphere(2, 1), matcher(20), matcher(10));
+        let good = matcher.describe("good", &mesh, &ignore).unwrap();
+        let few = other.describe("few", &mesh, &ignore).unwrap();
+        for (source, target) in [(&good, &few), (&few, &good)] {
+            let error = matcher.match_shapes(source, target, &ignore).unwrap_err().to_string();
+            assert!(
+                error.starts_with("few: described with 10 eigenpairs, but the matcher takes 20; "),
+                "{error}"
+            );
+        }
+        other.match_shapes(&good, &few, &ignore).unwrap();
+        let mut wrong = good.clone();
+        wrong.descriptors.data_mut()[0] = f32::NAN;
+        let error = matcher.match_shapes(&good, &wrong, &ignore).unwrap_err().to_string();
+        assert!(error.starts_with("good -> good: row "), "{error}");
+        let error = matcher.describe("tiny", &bumpy_sphere(0, 1), &ignore).unwrap_err().to_string();
+        assert!(error.starts_with("tiny: 20 eigenpairs"), "{error}");
+    }
 }

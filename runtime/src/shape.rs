@@ -33,6 +33,16 @@ impl Default for ShapeOptions {
     }
 }
 
+impl ShapeOptions {
+    /// Checks what no stage checks.
+    fn check(&self) -> Result<(), Error> {
+        match self.whole_area {
+            Some(area) if !(area > 0.0 && area.is_finite()) => Err(Error::WholeArea { area }),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A repaired, possibly decimated shape with its eigenbasis and SHOT descriptors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
@@ -63,8 +73,8 @@ impl Shape {
     /// Runs every stage on a mesh as read.
     ///
     /// # Errors
-    /// If repair leaves no face, the decimation target or the SHOT radius is out of range, the eigenbasis cannot be
-    /// computed or would take more memory than there is; it names the shape.
+    /// If repair leaves no face, the area of the whole, the decimation target or the SHOT radius is out of range, the
+    /// eigenbasis cannot be computed or would take more memory than there is; it names the shape.
     pub fn process(
         name: &str,
         mesh: &Mesh,
@@ -72,6 +82,7 @@ impl Shape {
         observer: Observer,
     ) -> Result<Self, Error> {
         let in_shape = |e: Error| e.in_shape(name);
+        options.check().map_err(in_shape)?;
         let repaired = timed(observer, name, "repair", || repair(mesh, &RepairOptions::default()))
             .map_err(|e| in_shape(e.into()))?;
         let full_mesh = repaired.mesh;
@@ -130,6 +141,7 @@ impl Shape {
         cache: Option<&Cache>,
         observer: Observer,
     ) -> Result<Self, Error> {
+        options.check().map_err(|e| e.in_shape(name))?;
         let Some(cache) = cache else { return Self::process(name, mesh, options, observer) };
         let key = Self::cache_key(mesh, options);
         let found = timed(observer, name, "cache", || cache.fetch("shape", key, observer));
@@ -238,4 +250,29 @@ fn encode_mesh(out: &mut Encoder, mesh: &Mesh) {
 
 fn decode_mesh(input: &mut Decoder) -> Option<Mesh> {
     Mesh::new(input.slice()?, input.slice()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::ignore;
+    use crate::mesh::shapes::icosphere;
+
+    #[test]
+    fn the_area_of_a_whole_is_checked_before_any_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache::open(folder.path()).unwrap();
+        let whole = ShapeOptions { k: 5, ..ShapeOptions::default() };
+        Shape::process_cached("whole", &icosphere(2), &whole, Some(&cache), &ignore).unwrap();
+        let silent: Observer = &|_| panic!("no stage may run");
+        for area in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let options = ShapeOptions { whole_area: Some(area), ..whole.clone() };
+            for cache in [None, Some(&cache)] {
+                let error =
+                    Shape::process_cached("part", &icosphere(2), &options, cache, silent).unwrap_err();
+                let message = error.to_string();
+                assert!(message.starts_with("part: whole_area is "), "{message}");
+            }
+        }
+    }
 }

@@ -122,7 +122,7 @@ train_config! {
     pool: usize = 2500,
     /// Eigenfunctions of each shape, 1 to 352
     k ('k'): usize = 120,
-    /// Meshes of more vertices are decimated to so many; 0: never
+    /// Meshes of more vertices are decimated to so many, 500 or more; 0: never
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area), between 0 and 1
     shot_radius: f64 = ShotOptions::default().radius,
@@ -152,7 +152,7 @@ train_config! {
     learning_rate: f64 = 1e-3,
     /// Learning rate at the end, 0 or more; it falls along a half cosine
     final_learning_rate: f64 = 1e-5,
-    /// Gradients of a larger norm are scaled down to it; 0: never
+    /// Gradients of a larger norm are scaled down to it, 0 or more; 0: never
     clip: f64 = 0.0,
     /// Seed of the initialisation, the pools and the minibatches
     seed: u64 = 1,
@@ -160,7 +160,7 @@ train_config! {
     checkpoint_every: u64 = 100,
     /// Minibatches between validations; 0: never
     validate_every: u64 = 500,
-    /// Pairs of the validation split to validate on, at most
+    /// Pairs of the validation split to validate on, at most, 1 or more
     validation_pairs: usize = 10,
 }
 
@@ -222,6 +222,8 @@ impl TrainConfig {
             true => Ok(()),
             false => Err(ConfigError::Range { name, value: value.to_string(), expected }),
         };
+        let at_least_0 = |value: f64| value >= 0.0 && value.is_finite();
+        let above_0 = |value: f64| value > 0.0 && value.is_finite();
         range("dataset", !self.dataset.0.is_empty(), &"empty", "one folder at least")?;
         range("steps", self.steps > 0, &self.steps, "1 or more")?;
         range("pairs", self.pairs > 0, &self.pairs, "1 or more")?;
@@ -245,17 +247,24 @@ impl TrainConfig {
             &self.shot_radius,
             "between 0 and 1",
         )?;
-        range("mask-weight", self.mask_weight >= 0.0, &self.mask_weight, "0 or more")?;
+        range("mask-weight", at_least_0(self.mask_weight), &self.mask_weight, "a finite number, 0 or more")?;
         range("gamma", (0.0..=1.0).contains(&self.gamma), &self.gamma, "from 0 to 1")?;
-        range("margin", self.margin > 0.0, &self.margin, "more than 0")?;
+        range("margin", above_0(self.margin), &self.margin, "a finite number above 0")?;
         range("blocks", (1..=64).contains(&self.blocks), &self.blocks, "from 1 to 64")?;
         range("jitter", (1..=100).contains(&self.jitter), &self.jitter, "from 1 (none) to 100")?;
-        range("learning-rate", self.learning_rate > 0.0, &self.learning_rate, "more than 0")?;
+        range("learning-rate", above_0(self.learning_rate), &self.learning_rate, "a finite number above 0")?;
         range(
             "final-learning-rate",
-            self.final_learning_rate >= 0.0,
+            at_least_0(self.final_learning_rate),
             &self.final_learning_rate,
-            "0 or more",
+            "a finite number, 0 or more",
+        )?;
+        range("clip", at_least_0(self.clip), &self.clip, "a finite number, 0 (never) or more")?;
+        range(
+            "validation-pairs",
+            self.validation_pairs > 0 || self.validate_every == 0,
+            &self.validation_pairs,
+            "1 or more; to leave out validation set validate-every to 0",
         )?;
         range("checkpoint-every", self.checkpoint_every > 0, &self.checkpoint_every, "1 or more")
     }
@@ -342,6 +351,30 @@ mod tests {
         assert!(TrainConfig::read(&path).unwrap_err().to_string().contains("learning-rat"));
         let config = TrainConfig { k: 400, dataset: List(vec!["a".into()]), ..Default::default() };
         assert!(config.check().unwrap_err().to_string().starts_with("k is 400"));
+    }
+
+    #[test]
+    fn every_number_out_of_its_range_is_named() {
+        let good = TrainConfig { dataset: List(vec!["a".into()]), ..Default::default() };
+        good.check().unwrap();
+        TrainConfig { validation_pairs: 0, validate_every: 0, ..good.clone() }.check().unwrap();
+        let named = |name: &str, set: &dyn Fn(&mut TrainConfig)| {
+            let mut config = good.clone();
+            set(&mut config);
+            let error = config.check().unwrap_err().to_string();
+            assert!(error.starts_with(&format!("{name} is ")), "{error}");
+        };
+        for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+            named("clip", &|c| c.clip = wrong);
+            named("mask-weight", &|c| c.mask_weight = wrong);
+            named("margin", &|c| c.margin = wrong);
+            named("gamma", &|c| c.gamma = wrong);
+            named("shot-radius", &|c| c.shot_radius = wrong);
+            named("learning-rate", &|c| c.learning_rate = wrong);
+            named("final-learning-rate", &|c| c.final_learning_rate = wrong);
+        }
+        named("validation-pairs", &|c| c.validation_pairs = 0);
+        named("decimate", &|c| c.decimate = 499);
     }
 
     #[test]

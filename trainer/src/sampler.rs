@@ -38,10 +38,27 @@ pub enum SamplerError {
         /// Points that a pair must share.
         points: usize,
     },
+    /// Too few of the points drawn are on both shapes of a pair.
+    #[error(
+        "{source_name} -> {target_name}: {common} of {drawn} points drawn are on both shapes, too few for a minibatch; raise the \
+         points, or leave out so small a part"
+    )]
+    TooFewCommon {
+        /// Name of the source, a part.
+        source_name: String,
+        /// Name of the target.
+        target_name: String,
+        /// Points on both.
+        common: usize,
+        /// Points drawn.
+        drawn: usize,
+    },
 }
 
 /// Fewer common points than this, or than the eigenfunctions that they must tell apart, do not make a pair.
 const MIN_COMMON_POINTS: usize = 50;
+/// A minibatch needs so many, as there are no pairs of different rows of fewer.
+const MIN_DRAWN_POINTS: usize = 2;
 
 impl<'a> Sampler<'a> {
     /// Lists the pairs and prepares the jitter.
@@ -72,23 +89,32 @@ impl<'a> Sampler<'a> {
     }
 
     /// Minibatch number `index` of the run, from 0: one pair or several.
-    pub fn batch(&self, index: u64) -> Vec<PairBatch> {
+    ///
+    /// # Errors
+    /// If fewer than 2 of the points drawn on a whole are on its part.
+    pub fn batch(&self, index: u64) -> Result<Vec<PairBatch>, SamplerError> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed);
         rng.set_stream(index + 1);
         (0..self.config.pairs).map(|_| self.pair(&mut rng)).collect()
     }
 
-    fn pair(&self, rng: &mut ChaCha8Rng) -> PairBatch {
+    fn pair(&self, rng: &mut ChaCha8Rng) -> Result<PairBatch, SamplerError> {
         let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
         let (common, all) = self.draw(&self.shapes[source], &self.shapes[target], rng);
+        if common.len() < MIN_DRAWN_POINTS {
+            let name = |shape: usize| self.shapes[shape].entry.name.clone();
+            let (source_name, target_name) = (name(source), name(target));
+            let (common, drawn) = (common.len(), all.len());
+            return Err(SamplerError::TooFewCommon { source_name, target_name, common, drawn });
+        }
         let negatives =
             if self.config.loss == LossKind::Siamese { negatives(common.len(), rng) } else { Vec::new() };
-        PairBatch {
+        Ok(PairBatch {
             source: self.sample(source, &common, rng),
             target: self.sample(target, &all, rng),
             source_is_part: self.shapes[source].entry.is_part(),
             negatives,
-        }
+        })
     }
 
     /// Draws points of the target's pool without replacement: those that the source has too, ascending, and all, the same ones
@@ -150,7 +176,7 @@ fn common_points(source: &PreparedShape, target: &PreparedShape) -> Vec<u32> {
     source.pool.points.iter().filter(in_target).copied().collect()
 }
 
-/// As many pairs of different rows as there are rows.
+/// As many pairs of different rows as there are rows, of which there must be 2 at least.
 fn negatives(rows: usize, rng: &mut ChaCha8Rng) -> Vec<(u32, u32)> {
     let other = |row: usize, rng: &mut ChaCha8Rng| (row + rng.random_range(1..rows)) % rows;
     (0..rows).map(|row| (row as u32, other(row, rng) as u32)).collect()
@@ -165,4 +191,45 @@ fn jitter_neighbors(shape: &PreparedShape, jitter: usize) -> Vec<u32> {
     let positions: Vec<[f64; 3]> =
         shape.points.iter().map(|&v| vertices[if v == MISSING { 0 } else { v as usize }]).collect();
     nearest_k_vertices(vertices, &positions, jitter)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{Correspondence, ShapeEntry, Split};
+    use crate::precompute::{PrepareOptions, prepare};
+    use fmnet::Mesh;
+    use fmnet::io::{Attributes, write_mesh};
+    use fmnet::mesh::shapes::bumpy_sphere;
+
+    #[test]
+    fn a_part_with_too_few_of_the_points_drawn_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = bumpy_sphere(3, 1);
+        let part = Mesh::new(whole.vertices().to_vec(), whole.faces()[..400].to_vec()).unwrap();
+        let config = TrainConfig { k: 5, pool: 1000, loss: LossKind::Siamese, ..TrainConfig::default() };
+        let shape = |(name, mesh, is_part): (&str, &Mesh, bool)| {
+            let path = folder.path().join(format!("{name}.off"));
+            write_mesh(&path, mesh, &Attributes::default()).unwrap();
+            let entry = ShapeEntry {
+                name: name.into(),
+                mesh: path,
+                group: "sphere".into(),
+                correspondence: Correspondence::Identity,
+                split: Split::Train,
+                whole: is_part.then(|| folder.path().join("whole.off")),
+            };
+            let options = PrepareOptions { shape: config.shape_options(), pool: config.pool, seed: 1 };
+            prepare(&entry, &options, None, &fmnet::events::ignore).unwrap()
+        };
+        let shapes = [("whole", &whole, false), ("part", &part, true)].map(shape);
+        let batch = |points: usize| {
+            Sampler::new(&shapes, &TrainConfig { points, ..config.clone() }).unwrap().batch(0)
+        };
+        let pair = &batch(1000).unwrap()[0];
+        let rows = pair.source.shot.rows();
+        assert!(rows > 50 && rows < pair.target.shot.rows() && pair.negatives.len() == rows);
+        let error = batch(1).unwrap_err().to_string();
+        assert!(error.starts_with("part -> whole: ") && error.contains(" of 1 points drawn"), "{error}");
+    }
 }

@@ -280,6 +280,7 @@ impl Run<'_> {
             });
             while self.step < last && !stop.load(Ordering::Relaxed) {
                 let Ok(batch) = batches.recv() else { break };
+                let batch = batch?;
                 let start = Instant::now();
                 let learning_rate = self.config.learning_rate_at(self.step);
                 let stats =

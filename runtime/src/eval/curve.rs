@@ -86,33 +86,33 @@ pub fn curves_csv(curves: &[(&str, &ErrorCurve)]) -> String {
     csv
 }
 
-/// Reads curves as [`curves_csv`] writes them, where no name has a comma or a quote: name and curve of each column. Lines
-/// start with a threshold; percentages follow.
+/// Reads curves as [`curves_csv`] writes them: name and curve of each column. Lines start with a threshold; percentages
+/// follow.
 ///
 /// # Errors
-/// In words, with the line: no header, a line of another number of columns, or a cell that is no number.
+/// In words, with the line: no header, a line of another number of columns, a cell that is no number, or a quote that is
+/// not closed.
 pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> {
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let (_, header) = lines.next().ok_or("no header")?;
-    let names: Vec<String> =
-        header.split(',').skip(1).map(|name| name.trim_matches('"').to_string()).collect();
+    let mut records = csv_records(text)?.into_iter();
+    let (line, mut header) =
+        records.next().ok_or("the file is empty; begin it with a header threshold,NAME,...")?;
+    let names = header.split_off(1);
     if names.is_empty() {
-        return Err("line 1: expected threshold,NAME,...".into());
+        return Err(format!("line {line}: no name of a curve; begin with a header threshold,NAME,..."));
     }
     let mut curves = vec![ErrorCurve { thresholds: Vec::new(), shares: Vec::new() }; names.len()];
-    for (index, line) in lines {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+    for (line, cells) in records {
         let number = |cell: &str| {
-            cell.parse::<f64>().map_err(|_| format!("line {}: {cell:?} is no number", index + 1))
+            let parsed = cell.parse::<f64>();
+            parsed.map_err(|_| format!("line {line}: {cell:?} is no number; write it as in 12.5"))
         };
         if cells.len() != names.len() + 1 {
+            let (found, expected) = (cells.len(), names.len() + 1);
             return Err(format!(
-                "line {}: {} columns, but the header has {}",
-                index + 1,
-                cells.len(),
-                names.len() + 1
+                "line {line}: {found} columns, but the header has {expected}; give each curve a cell, empty if need be"
             ));
         }
+        let cells: Vec<&str> = cells.iter().map(|cell| cell.trim()).collect();
         let threshold = number(cells[0])?;
         for (curve, cell) in curves.iter_mut().zip(&cells[1..]).filter(|(_, cell)| !cell.is_empty()) {
             curve.thresholds.push(threshold);
@@ -120,6 +120,44 @@ pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> 
         }
     }
     Ok(names.into_iter().zip(curves).collect())
+}
+
+/// The cells of each line that is not blank, with its number from 1. A cell in quotes may hold commas, line breaks and, doubled,
+/// quotes.
+fn csv_records(text: &str) -> Result<Vec<(usize, Vec<String>)>, String> {
+    let mut records = Vec::new();
+    let (mut cells, mut cell) = (Vec::new(), String::new());
+    let (mut line, mut first_line, mut is_quoted, mut previous) = (1, 1, false, '\n');
+    let missing_end = if text.ends_with('\n') { "" } else { "\n" };
+    for c in text.chars().chain(missing_end.chars()) {
+        line += usize::from(c == '\n');
+        match c {
+            '"' => {
+                if !is_quoted && previous == '"' {
+                    cell.push('"');
+                }
+                is_quoted = !is_quoted;
+            }
+            '\r' if !is_quoted => {}
+            ',' if !is_quoted => cells.push(std::mem::take(&mut cell)),
+            '\n' if !is_quoted => {
+                cells.push(std::mem::take(&mut cell));
+                let record = std::mem::take(&mut cells);
+                if record.len() > 1 || !record[0].trim().is_empty() {
+                    records.push((first_line, record));
+                }
+                first_line = line;
+            }
+            _ => cell.push(c),
+        }
+        previous = c;
+    }
+    if is_quoted {
+        return Err(format!(
+            "line {first_line}: a quote is not closed; close it, or double it within a name"
+        ));
+    }
+    Ok(records)
 }
 
 fn csv_field(text: &str) -> String {
@@ -164,8 +202,32 @@ mod tests {
         let theirs = ErrorCurve::new(&[0.0], vec![0.0]);
         let csv = curves_csv(&[("ours", &ours), ("theirs, raw", &theirs)]);
         assert_eq!(csv, "threshold,ours,\"theirs, raw\"\n0,50.0000,100.0000\n0.003,100.0000,\n");
-        let read = curves_from_csv(&csv.replace("theirs, raw", "theirs")).unwrap();
-        assert_eq!(read, [("ours".to_string(), ours), ("theirs".to_string(), theirs)]);
-        assert!(curves_from_csv("threshold,a\n0,x\n").unwrap_err().contains("line 2"));
+    }
+
+    #[test]
+    fn csv_reads_back_whatever_the_names() {
+        let ours = ErrorCurve::new(&[0.0, 0.003], vec![0.0, 3.0 * 0.001]);
+        let theirs = ErrorCurve::new(&[0.0], vec![0.0]);
+        for name in ["theirs", "theirs, raw", "\"theirs\"", "\"", "a\"\",\"b", "two\r\nlines", ""] {
+            let csv = curves_csv(&[("ours", &ours), (name, &theirs)]);
+            let expected = [("ours".to_string(), ours.clone()), (name.to_string(), theirs.clone())];
+            for text in [csv.clone(), csv.replace("\n0", "\r\n\r\n0"), csv.trim_end().to_string()] {
+                assert_eq!(curves_from_csv(&text).unwrap(), expected, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_csv_is_named_by_its_line() {
+        for (text, part) in [
+            ("", "empty; begin"),
+            ("\nthreshold\n", "line 2: no name"),
+            ("threshold,a\n0,x\n", "line 2: \"x\""),
+            ("threshold,\"a\nb\"\n0,1,2", "line 3: 3 columns, but the header has 2"),
+            ("threshold,\"a\n0,1\n", "line 1: a quote"),
+        ] {
+            let error = curves_from_csv(text).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        }
     }
 }

@@ -126,6 +126,7 @@ pub struct FmapInfo {
 
 /// Why a functional map cannot be computed.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum FmapError {
     /// Source and target have different numbers of descriptors.
     #[error(
@@ -138,7 +139,9 @@ pub enum FmapError {
         target_count: usize,
     },
     /// An array does not fit the others.
-    #[error("{what} has length {found}, expected {expected}")]
+    #[error(
+        "{what} has length {found}, expected {expected}; compute all of a shape's arrays from one eigenbasis"
+    )]
     SizeMismatch {
         /// The array.
         what: &'static str,
@@ -148,7 +151,7 @@ pub enum FmapError {
         expected: usize,
     },
     /// A basis or the descriptors have no entries.
-    #[error("{what} is empty; a functional map needs at least one eigenfunction and one descriptor")]
+    #[error("{what} is empty; a functional map needs at least one vertex, eigenfunction and descriptor")]
     Empty {
         /// What is empty.
         what: &'static str,
@@ -169,7 +172,8 @@ pub enum FmapError {
     },
     /// A point map names a vertex that does not exist.
     #[error(
-        "source vertex {vertex} is matched to target vertex {target}, but the target has {n_target} vertices (0-based)"
+        "source vertex {vertex} is matched to target vertex {target}, but the target has {n_target} vertices (0-based); \
+         give a map to the mesh that the basis is of"
     )]
     TargetOutOfRange {
         /// The source vertex.

@@ -50,7 +50,7 @@ impl<'a> SoftCorrespondence<'a> {
     /// The soft correspondence of the functional map `c`, `[k_target, k_source]`.
     ///
     /// # Errors
-    /// If `c` is not of that shape.
+    /// If `c` is not of that shape, or the target has no vertices.
     pub fn new(
         basis_source: &Eigenbasis,
         basis_target: &'a Eigenbasis,
@@ -59,6 +59,9 @@ impl<'a> SoftCorrespondence<'a> {
     ) -> Result<Self, FmapError> {
         check_length("a row of the functional map", c.cols(), basis_source.k())?;
         check_length("a column of the functional map", c.rows(), basis_target.k())?;
+        if basis_target.n() == 0 {
+            return Err(FmapError::Empty { what: "the target's basis" });
+        }
         let transported = dense::multiply(basis_source.eigenvectors.as_faer(), c.as_faer().transpose());
         Ok(Self { transported, basis_target: &basis_target.eigenvectors, norm })
     }
@@ -95,7 +98,7 @@ impl<'a> SoftCorrespondence<'a> {
                 let first = block * BLOCK;
                 let columns = self.columns(first, BLOCK.min(n_source - first));
                 let peaks: Vec<SoftPeak> =
-                    columns.data().chunks_exact(n_target.max(1)).map(|column| self.peak(column)).collect();
+                    columns.data().chunks_exact(n_target).map(|column| self.peak(column)).collect();
                 peaks
             })
             .collect()

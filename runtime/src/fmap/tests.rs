@@ -249,6 +249,9 @@ fn soft_correspondence_refuses_to_fill_the_memory() {
     assert_eq!(soft.dense(1000), Err(expected));
     let zero = SoftCorrespondence::new(&basis, &basis, &Matrix::zeros(5, 5), ColumnNorm::L2).unwrap();
     assert!(zero.peaks().iter().all(|peak| *peak == SoftPeak { target: 0, weight: 0.0, spread: 0.0 }));
+    let none = Eigenbasis { eigenvectors: Matrix::zeros(0, 5), mass: Vec::new(), ..basis.clone() };
+    let nowhere = SoftCorrespondence::new(&basis, &none, &identity(5), ColumnNorm::L2).unwrap_err();
+    assert_eq!(nowhere, FmapError::Empty { what: "the target's basis" });
 }
 
 #[test]

@@ -38,7 +38,9 @@ pub struct Mesh {
 #[non_exhaustive]
 pub enum MeshError {
     /// A face names a vertex that does not exist.
-    #[error("face {face} refers to vertex {index}, but there are only {n_vertices} vertices (0-based)")]
+    #[error(
+        "face {face} refers to vertex {index}, but there are only {n_vertices} vertices (0-based); correct it or remove the face"
+    )]
     IndexOutOfRange {
         /// The face, 0-based.
         face: usize,
@@ -48,7 +50,9 @@ pub enum MeshError {
         n_vertices: usize,
     },
     /// A vertex has a coordinate that is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not finite: {position:?}")]
+    #[error(
+        "vertex {vertex} has a coordinate that is not finite: {position:?}; correct it or remove the vertex"
+    )]
     NotFinite {
         /// The vertex, 0-based.
         vertex: usize,
@@ -56,7 +60,7 @@ pub enum MeshError {
         position: [f64; 3],
     },
     /// More vertices than a 32-bit index can name.
-    #[error("{n_vertices} vertices are more than the {} supported", u32::MAX)]
+    #[error("{n_vertices} vertices are more than the {} supported; decimate or split the mesh", u32::MAX - 1)]
     TooLarge {
         /// How many vertices there are.
         n_vertices: usize,

@@ -29,6 +29,8 @@ const MAX_K: usize = 500;
 const MIN_DECIMATE: usize = 100;
 
 const PREFIX: &str = "fmnet.";
+/// The remedy for a file that is no model of ours.
+const EXPORT: &str = "export the model with `fmnet-train export`";
 const ONNX_FLOAT: i32 = 1;
 
 /// What the runtime must know of a model, and what people want to know of it.
@@ -103,7 +105,11 @@ impl ModelMetadata {
             "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
             "two-way" => FmapSolver::TwoWay { weight: pairs.value("mask_weight")? },
             "part" => FmapSolver::Part { weight: pairs.value("mask_weight")? },
-            other => return Err(pairs.contract(format!("unknown {PREFIX}solver {other:?}"))),
+            other => {
+                return Err(pairs.contract(format!(
+                    "{PREFIX}solver is {other:?}, but must be least-squares, regularized, two-way or part; export the model anew"
+                )));
+            }
         };
         let metadata = Self {
             format_version,
@@ -166,14 +172,17 @@ impl Pairs<'_> {
 
     fn text(&self, key: &str) -> Result<&str, NetworkError> {
         let key = format!("{PREFIX}{key}");
-        self.values.get(&key).map(String::as_str).ok_or_else(|| {
-            self.contract(format!("no {key} in the metadata; export the model with `fmnet-train export`"))
-        })
+        self.values
+            .get(&key)
+            .map(String::as_str)
+            .ok_or_else(|| self.contract(format!("no {key} in the metadata; {EXPORT}")))
     }
 
     fn value<T: FromStr>(&self, key: &str) -> Result<T, NetworkError> {
         let text = self.text(key)?;
-        text.parse().map_err(|_| self.contract(format!("{PREFIX}{key} is {text:?}, which does not parse")))
+        text.parse().map_err(|_| {
+            self.contract(format!("{PREFIX}{key} is {text:?}, which does not parse; export the model anew"))
+        })
     }
 }
 
@@ -183,16 +192,16 @@ impl Pairs<'_> {
 /// If it is no ONNX file, its graph has another input or output, or a key is missing or out of range.
 pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, NetworkError> {
     let contract = |reason: String| NetworkError::Contract { path: path.to_path_buf(), reason };
-    let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file: {e}")))?;
-    let graph = model.graph.ok_or_else(|| contract("no graph in it; not an ONNX model".into()))?;
+    let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file ({e}); {EXPORT}")))?;
+    let graph = model.graph.ok_or_else(|| contract(format!("no graph in it; {EXPORT}")))?;
     if let Some(opset) = model.opset_import.iter().find(|o| !o.domain.is_empty() && o.domain != "ai.onnx") {
         return Err(contract(format!(
-            "operators of the domain {:?}; only standard ones are allowed",
+            "operators of the domain {:?}, but only standard ones are allowed; {EXPORT}",
             opset.domain
         )));
     }
-    check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}")))?;
-    check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}")))?;
+    check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}; {EXPORT}")))?;
+    check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}; {EXPORT}")))?;
     if !graph.node.iter().any(|node| node.output.iter().any(|name| name == OUTPUT)) {
         return Err(contract(format!(
             "no operator gives {OUTPUT:?}; the file is damaged, export the model anew"
@@ -260,5 +269,30 @@ mod tests {
         assert!(read_contract(path, &model_giving(OUTPUT)).is_ok());
         let error = read_contract(path, &model_giving("descriptorz")).unwrap_err().to_string();
         assert!(error.contains("no operator gives \"descriptors\""), "{error}");
+    }
+
+    #[test]
+    fn what_breaks_the_contract_is_named_with_the_remedy() {
+        let good = Model::decode(model_giving(OUTPUT).as_slice()).unwrap();
+        let broken = |change: &dyn Fn(&mut Model)| {
+            let mut model = good.clone();
+            change(&mut model);
+            read_contract(Path::new("m.onnx"), &model.encode_to_vec()).unwrap_err().to_string()
+        };
+        let set = |model: &mut Model, key: &str, value: &str| {
+            let entry = model.metadata_props.iter_mut().find(|entry| entry.key == key).unwrap();
+            entry.value = value.into();
+        };
+        let errors = [
+            (read_contract(Path::new("m.onnx"), b"text").unwrap_err().to_string(), "not an ONNX file"),
+            (broken(&|m| m.graph = None), "no graph"),
+            (broken(&|m| m.graph.as_mut().unwrap().input.clear()), "input: expected one"),
+            (broken(&|m| m.graph.as_mut().unwrap().output[0].kind = None), "output: not a tensor"),
+            (broken(&|m| set(m, "fmnet.solver", "magic")), "fmnet.solver is \"magic\""),
+            (broken(&|m| set(m, "fmnet.k", "many")), "fmnet.k is \"many\""),
+        ];
+        for (error, what) in errors {
+            assert!(error.contains(what) && error.contains("; export the model"), "{error}");
+        }
     }
 }

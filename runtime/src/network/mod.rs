@@ -76,7 +76,7 @@ pub enum NetworkError {
         reason: String,
     },
     /// The input has another width.
-    #[error("the network takes descriptors of width {WIDTH}, not {width}")]
+    #[error("the network takes descriptors of width {WIDTH}, not {width}; compute SHOT with 10 bins")]
     Width {
         /// Width of the input.
         width: usize,
@@ -85,6 +85,7 @@ pub enum NetworkError {
 
 /// A loaded model.
 pub struct DescriptorNetwork {
+    path: PathBuf,
     metadata: ModelMetadata,
     fingerprint: [u8; 32],
     backend: Backend,
@@ -100,6 +101,7 @@ trait Engine: Send + Sync {
 impl fmt::Debug for DescriptorNetwork {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("DescriptorNetwork")
+            .field("path", &self.path)
             .field("metadata", &self.metadata)
             .field("backend", &self.backend)
             .finish_non_exhaustive()
@@ -127,7 +129,8 @@ impl DescriptorNetwork {
             Failure::Absent => NetworkError::BackendAbsent { backend },
             Failure::Refused(reason) => NetworkError::Backend { path: path.to_path_buf(), backend, reason },
         })?;
-        Ok(Self { metadata, fingerprint: *blake3::hash(bytes).as_bytes(), backend, engine })
+        let fingerprint = *blake3::hash(bytes).as_bytes();
+        Ok(Self { path: path.to_path_buf(), metadata, fingerprint, backend, engine })
     }
 
     /// What travels with the model.
@@ -154,7 +157,7 @@ impl DescriptorNetwork {
             return Err(NetworkError::Width { width: shot.cols() });
         }
         let failed =
-            |reason| NetworkError::Backend { path: PathBuf::from("network"), backend: self.backend, reason };
+            |reason| NetworkError::Backend { path: self.path.clone(), backend: self.backend, reason };
         self.engine.run(shot).map_err(failed)
     }
 }
@@ -176,5 +179,47 @@ fn load_engine(bytes: &[u8], metadata: &ModelMetadata, backend: Backend) -> Resu
         Backend::Ort => Ok(Box::new(ort::OrtEngine::load(bytes).map_err(Failure::Refused)?)),
         #[allow(unreachable_patterns)]
         _ => Err(Failure::Absent),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::descriptor::ShotOptions;
+    use crate::fmap::FmapSolver;
+
+    struct Failing;
+
+    impl Engine for Failing {
+        fn run(&self, _: &Matrix<f32>) -> Result<Matrix<f32>, String> {
+            Err("no".into())
+        }
+    }
+
+    #[test]
+    fn a_failure_names_the_model_file() {
+        let metadata = ModelMetadata {
+            format_version: 1,
+            shot: ShotOptions::default(),
+            k: 20,
+            solver: FmapSolver::LeastSquares,
+            decimate: None,
+            per_shape_statistics: false,
+            training_set: String::new(),
+            seed: 0,
+            steps: 0,
+            commit: String::new(),
+            license: String::new(),
+        };
+        let network = DescriptorNetwork {
+            path: "m.onnx".into(),
+            metadata,
+            fingerprint: [0; 32],
+            backend: Backend::Tract,
+            engine: Box::new(Failing),
+        };
+        let error = |width| network.descriptors(&Matrix::zeros(1, width)).unwrap_err().to_string();
+        assert_eq!(error(WIDTH), "m.onnx: tract: no");
+        assert!(error(320).ends_with("not 320; compute SHOT with 10 bins"), "{}", error(320));
     }
 }

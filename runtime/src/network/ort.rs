@@ -53,7 +53,10 @@ impl Engine for OrtEngine {
         let outputs = session.run(ort::inputs![INPUT => input]).map_err(|e| e.to_string())?;
         let (shape, values) = outputs[OUTPUT].try_extract_tensor::<f32>().map_err(|e| e.to_string())?;
         if values.len() != shot.rows() * WIDTH {
-            return Err(format!("output of shape {shape:?}"));
+            return Err(format!(
+                "output of shape {shape:?} instead of {:?}; export the model anew",
+                [shot.rows(), WIDTH]
+            ));
         }
         Ok(Matrix::from_vec(shot.rows(), WIDTH, values.to_vec()))
     }

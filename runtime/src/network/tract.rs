@@ -61,7 +61,11 @@ impl TractEngine {
         if values.len() == rows.len() {
             Ok(values)
         } else {
-            Err(format!("output of shape {:?}", output.shape()))
+            Err(format!(
+                "output of shape {:?} instead of {:?}; export the model anew",
+                output.shape(),
+                [n, WIDTH]
+            ))
         }
     }
 }

@@ -7,4 +7,4 @@ mod types;
 pub use recover::{Comparison, RecoverError, recover, recover_by};
 pub use types::PointMap;
 
-pub(crate) use recover::{cosines, recover_transported, transport, transposed};
+pub(crate) use recover::{check_shape, cosines, recover_transported, transport, transposed};

@@ -55,6 +55,31 @@ pub enum RecoverError {
         /// Eigenfunctions of the source.
         k_source: usize,
     },
+    /// The positions are not those of the source.
+    #[error("{found} vertices for a source basis of {expected}; give those of the mesh that the basis is of")]
+    VertexCount {
+        /// Number of positions.
+        found: usize,
+        /// Vertices of the source's basis.
+        expected: usize,
+    },
+    /// A match names a vertex that does not exist.
+    #[error(
+        "match {index} is of source vertex {source_vertex} and target vertex {target_vertex}, but the shapes have {n_source} \
+         and {n_target} vertices (0-based); give matches between the vertices that the bases are of"
+    )]
+    MatchOutOfRange {
+        /// The match, 0-based.
+        index: usize,
+        /// Its source vertex.
+        source_vertex: u32,
+        /// Its target vertex.
+        target_vertex: u32,
+        /// Vertices of the source.
+        n_source: usize,
+        /// Vertices of the target.
+        n_target: usize,
+    },
     /// The nearest neighbour search failed.
     #[error(transparent)]
     Search(#[from] SearchError),
@@ -89,16 +114,26 @@ pub fn recover_by(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
 ) -> Result<PointMap, RecoverError> {
-    let (k_target, k_source) = (basis_target.k(), basis_source.k());
-    if (c.rows(), c.cols()) != (k_target, k_source) {
-        return Err(RecoverError::ShapeMismatch { rows: c.rows(), cols: c.cols(), k_target, k_source });
-    }
+    check_shape(c, basis_source, basis_target)?;
     let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
     let (targets, confidence) = match comparison {
         Comparison::Distance => nearest_with_cosine(&transport(phi, c), psi)?,
         Comparison::PulledBack => nearest_with_cosine(phi, &transport(psi, &transposed(c)))?,
     };
     Ok(PointMap { targets, confidence: Some(confidence), n_target: basis_target.n() })
+}
+
+/// Checks that `c` is `[k_target, k_source]`.
+pub(crate) fn check_shape(
+    c: &Matrix,
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+) -> Result<(), RecoverError> {
+    let (k_target, k_source) = (basis_target.k(), basis_source.k());
+    if (c.rows(), c.cols()) == (k_target, k_source) {
+        return Ok(());
+    }
+    Err(RecoverError::ShapeMismatch { rows: c.rows(), cols: c.cols(), k_target, k_source })
 }
 
 /// For each row of `transported`, `[n_source, k_target]`, the nearest row of the target's eigenvectors.

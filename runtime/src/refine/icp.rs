@@ -4,7 +4,7 @@ use super::{RefineError, Refined};
 use crate::Matrix;
 use crate::fmap::{functional_map_of, multiply, thin_svd};
 use crate::point_map::search::NearestRows;
-use crate::point_map::{PointMap, RecoverError, cosines, transport};
+use crate::point_map::{PointMap, check_shape, cosines, transport};
 use crate::spectral::Eigenbasis;
 
 /// Options of [`icp`].
@@ -46,10 +46,7 @@ pub fn icp(
     basis_target: &Eigenbasis,
     options: &IcpOptions,
 ) -> Result<Refined<IcpInfo>, RefineError> {
-    let (k_target, k_source) = (basis_target.k(), basis_source.k());
-    if (c.rows(), c.cols()) != (k_target, k_source) {
-        return Err(RecoverError::ShapeMismatch { rows: c.rows(), cols: c.cols(), k_target, k_source }.into());
-    }
+    check_shape(c, basis_source, basis_target)?;
     if options.max_iterations == 0 {
         let range = "at least 1".to_string();
         return Err(RefineError::Option { option: "max_iterations", value: 0, range });

@@ -8,6 +8,7 @@ mod zoomout;
 use crate::Matrix;
 use crate::fmap::FmapError;
 use crate::point_map::{PointMap, RecoverError, search::SearchError};
+use crate::spectral::Eigenbasis;
 use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
@@ -76,6 +77,12 @@ pub enum RefineError {
         /// Vertices of the target's basis.
         n_target: usize,
     },
+    /// A basis has no eigenfunctions.
+    #[error("the {side} has no eigenfunctions; compute its eigenbasis with k of at least 1")]
+    NoEigenfunctions {
+        /// `source` or `target`.
+        side: &'static str,
+    },
     /// Not one source vertex has a match to start from.
     #[error("no source vertex is matched; refinement improves a map, it cannot start without one")]
     NothingMatched,
@@ -88,6 +95,14 @@ pub enum RefineError {
     /// The nearest neighbour search failed.
     #[error(transparent)]
     Search(#[from] SearchError),
+}
+
+/// Checks that both bases have eigenfunctions.
+fn check_bases(basis_source: &Eigenbasis, basis_target: &Eigenbasis) -> Result<(), RefineError> {
+    match [("source", basis_source), ("target", basis_target)].into_iter().find(|(_, basis)| basis.k() == 0) {
+        Some((side, _)) => Err(RefineError::NoEigenfunctions { side }),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

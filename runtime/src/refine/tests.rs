@@ -134,6 +134,13 @@ fn options_out_of_range_are_errors() {
         assert!(matches!(zoomout(&map, &basis, &basis, &options), Err(RefineError::Option { .. })));
     }
     assert_eq!(zoomout(&map, &basis, &basis, &default).unwrap().info.rounds, [10], "clamped to the basis");
+    let empty = basis.truncated(0);
+    for (source, target, side) in [(&empty, &basis, "source"), (&basis, &empty, "target")] {
+        let error = zoomout(&map, source, target, &default).unwrap_err();
+        assert_eq!(error, RefineError::NoEigenfunctions { side });
+        let error = pmf(&map, source, target, PmfHints::default(), &PmfOptions::default()).unwrap_err();
+        assert_eq!(error, RefineError::NoEigenfunctions { side });
+    }
     let none = icp(&identity(10), &basis, &basis, &IcpOptions { max_iterations: 0 });
     assert!(matches!(none, Err(RefineError::Option { option: "max_iterations", .. })));
     let wrong = icp(&identity(9), &basis, &basis, &IcpOptions::default());

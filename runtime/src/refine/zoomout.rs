@@ -1,7 +1,7 @@
 //! ZoomOut (Melzi et al. 2019): spectral upsampling of a map.
 
 use super::sampling::farthest_points;
-use super::{RefineError, Refined};
+use super::{RefineError, Refined, check_bases};
 use crate::Matrix;
 use crate::fmap::{
     LeastSquaresOptions, functional_map_of, least_squares, mean_with_transpose, multiply,
@@ -80,13 +80,15 @@ pub struct ZoomOutInfo {
 /// ten pairs of remeshed FAUST shapes a mean error of 1.73 instead of 1.93.
 ///
 /// # Errors
-/// If an option is out of range, the map does not fit the bases or matches nothing, or an entry of a basis is not finite.
+/// If an option is out of range, a basis has no eigenfunctions, the map does not fit the bases or matches nothing, or an entry
+/// of a basis is not finite.
 pub fn zoomout(
     map: &PointMap,
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
     options: &ZoomOutOptions,
 ) -> Result<Refined<ZoomOutInfo>, RefineError> {
+    check_bases(basis_source, basis_target)?;
     let rounds = rounds(options, basis_source.k().min(basis_target.k()))?;
     // Checks the whole point map, whatever the first round will use of it.
     functional_map_of(map, &basis_source.truncated(1), &basis_target.truncated(1))?;
@@ -211,9 +213,6 @@ fn rounds(options: &ZoomOutOptions, k_available: usize) -> Result<Vec<usize>, Re
     }
     if options.k_max < options.k_start {
         return Err(bad("k_max", options.k_max, &format!("at least k_start, {}", options.k_start)));
-    }
-    if k_available == 0 {
-        return Err(bad("the number of eigenfunctions", 0, "at least 1"));
     }
     let last = options.k_max.min(k_available);
     let mut rounds: Vec<usize> = (options.k_start..last).step_by(options.k_step).collect();

@@ -22,15 +22,15 @@ const TURN: f64 = 0.35;
 const FILL: f64 = 0.94;
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 
-/// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, twice as many
-/// columns. Errors and panics as of [`side_by_side`].
+/// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, 1 or more, twice as
+/// many columns. Errors and panics as of [`side_by_side`].
 pub fn pair_picture(
     source: &Mesh,
     target: &Mesh,
     map: &PointMap,
     width: usize,
 ) -> Result<Picture, MeshError> {
-    let half = width / 2;
+    let half = (width / 2).max(1);
     let (left, right) = (turned(source)?, turned(target)?);
     let (mesh, attributes) = side_by_side(&left, &right, map)?;
     Ok(picture(&mesh, &attributes.vertex_colors.unwrap_or_default(), 2 * half, half))
@@ -80,17 +80,17 @@ impl Picture {
         self.pixels.get(row * self.width + column).copied().unwrap_or(BACKGROUND)
     }
 
-    /// The picture as a PNG file.
-    ///
-    /// # Panics
-    /// If it has no pixels, or not `height * width` of them.
+    /// The picture as a PNG file, which has a row and a column at least. Missing pixels are white.
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        let (width, height) = (self.width.max(1), self.height.max(1));
+        let mut pixels = self.pixels.clone();
+        pixels.resize(width * height, BACKGROUND);
+        let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let written =
-            encoder.write_header().and_then(|mut writer| writer.write_image_data(self.pixels.as_flattened()));
+            encoder.write_header().and_then(|mut writer| writer.write_image_data(pixels.as_flattened()));
         written.expect("the pixels have the stated size, and memory takes every write");
         bytes
     }
@@ -245,12 +245,15 @@ mod tests {
 
     #[test]
     fn png_reads_back() {
-        let picture = Picture { width: 2, height: 1, pixels: vec![[1, 2, 3], [4, 5, 6]] };
-        let png = picture.to_png();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        reader.next_frame(&mut pixels).unwrap();
-        assert_eq!(pixels, [1, 2, 3, 4, 5, 6]);
+        let read = |picture: Picture| {
+            let mut reader = png::Decoder::new(std::io::Cursor::new(picture.to_png())).read_info().unwrap();
+            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut pixels).unwrap();
+            pixels
+        };
+        let pixels = vec![[1, 2, 3], [4, 5, 6]];
+        assert_eq!(read(Picture { width: 2, height: 1, pixels }), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(read(Picture { width: 0, height: 0, pixels: Vec::new() }), BACKGROUND);
     }
 
     #[test]
@@ -259,6 +262,7 @@ mod tests {
         let map = PointMap::new((0..mesh.n_vertices() as u32).collect(), mesh.n_vertices());
         let picture = pair_picture(&mesh, &mesh, &map, 200).unwrap();
         assert_eq!((picture.width, picture.height), (200, 100));
+        assert_eq!(pair_picture(&mesh, &mesh, &map, 1).unwrap().pixels.len(), 2);
         let row = &picture.pixels[50 * 200..51 * 200];
         assert!(row[50] != BACKGROUND && row[150] != BACKGROUND && row[100] == BACKGROUND);
     }

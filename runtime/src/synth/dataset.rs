@@ -19,7 +19,7 @@ pub struct DatasetOptions {
     pub per_species: usize,
     /// Share of the individuals of a species that are for validation, in [0, 0.9]; default 0.1.
     pub validation: f64,
-    /// Another seed, other individuals; default 0.
+    /// Another seed, other individuals; 0 to 65535, as larger ones are the demo's; default 0.
     pub seed: u32,
     /// Triangulation and damage.
     pub body: SynthOptions,
@@ -130,6 +130,9 @@ impl DatasetOptions {
         let refuse = |option, value: String, range| Err(SynthError::Option { option, value, range });
         if !(2..1 << 24).contains(&self.per_species) {
             return refuse("per_species", self.per_species.to_string(), "2 to 16777215");
+        }
+        if self.seed > u32::from(u16::MAX) {
+            return refuse("seed", self.seed.to_string(), "0 to 65535, as larger ones are the demo's");
         }
         if !(0.0..=0.9).contains(&self.validation) {
             return refuse("validation", self.validation.to_string(), "0 to 0.9");

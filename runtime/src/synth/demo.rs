@@ -13,10 +13,10 @@ pub struct DemoPair {
     pub ground_truth: Vec<u32>,
 }
 
-/// Seeds from here on are used by no dataset of a seed below 65536, whatever its size.
+/// Seeds from here on are used by no dataset, whatever its seed and size.
 const UNSEEN: u64 = 1 << 40;
 
-/// Two different individuals of `species`, with seeds that no dataset of a seed below 65536 uses; another `pair`, other two.
+/// Two different individuals of `species`, with seeds that no dataset uses; another `pair`, other two.
 pub fn demo_pair(species: Species, pair: u32) -> DemoPair {
     let template = Template::new(species);
     let first = UNSEEN + 2 * u64::from(pair);

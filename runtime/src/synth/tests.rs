@@ -207,6 +207,10 @@ fn options_out_of_range_are_named() {
     let options = SynthOptions { hole_radius: 0.0, ..SynthOptions::default() };
     let message = generate(Species::Man, 0, &options).unwrap_err().to_string();
     assert!(message.contains("hole_radius"), "{message}");
+    let folder = tempfile::tempdir().unwrap();
+    let options = DatasetOptions { seed: 1 << 16, ..DatasetOptions::default() };
+    let message = write_dataset(folder.path(), &options, &|_, _| {}).unwrap_err().to_string();
+    assert!(message.contains("seed") && message.contains("0 to 65535"), "{message}");
 }
 
 #[test]

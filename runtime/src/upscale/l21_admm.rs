@@ -61,6 +61,14 @@ pub enum UpscaleError {
         /// Rows of the target side.
         target_rows: usize,
     },
+    /// A side has no basis functions.
+    #[error(
+        "the {side} has no basis functions; a map needs an eigenbasis of at least one eigenfunction of either shape"
+    )]
+    NoFunctions {
+        /// `source` or `target`.
+        side: &'static str,
+    },
     /// Too few matches to determine the map.
     #[error(
         "{matches} matches do not determine a map of k = {k} source functions; use a smaller k or more matches"
@@ -87,7 +95,8 @@ pub enum UpscaleError {
 /// on the number of threads.
 ///
 /// # Errors
-/// If the numbers of rows differ, are fewer than `k_source`, or the rows of `phi` do not determine the map.
+/// If the numbers of rows differ or are fewer than `k_source`, `k_source` or `k_target` is 0, or the rows of `phi` do not
+/// determine the map.
 pub fn l21_functional_map(
     phi: &Matrix,
     psi: &Matrix,
@@ -185,6 +194,11 @@ impl PseudoInverse {
         let (m, k) = (phi.rows(), phi.cols());
         if psi.rows() != m {
             return Err(UpscaleError::RowCount { source_rows: m, target_rows: psi.rows() });
+        }
+        for (side, columns) in [("source", k), ("target", psi.cols())] {
+            if columns == 0 {
+                return Err(UpscaleError::NoFunctions { side });
+            }
         }
         if m < k {
             return Err(UpscaleError::TooFewMatches { matches: m, k });
@@ -327,6 +341,11 @@ mod tests {
     fn impossible_problems_are_errors() {
         let few = l21_functional_map(&random(5, 6, 1), &random(5, 6, 2), &AdmmOptions::default());
         assert_eq!(few.unwrap_err(), UpscaleError::TooFewMatches { matches: 5, k: 6 });
+        for (k_source, k_target, side) in [(4, 0, "target"), (0, 4, "source")] {
+            let (phi, psi) = (random(5, k_source, 1), random(5, k_target, 2));
+            let none = l21_functional_map(&phi, &psi, &AdmmOptions::default());
+            assert_eq!(none.unwrap_err(), UpscaleError::NoFunctions { side });
+        }
         let twice = Matrix::from_fn(50, 4, |i, j| ((i * 7 + j / 2) as f64).sin());
         let singular = l21_functional_map(&twice, &random(50, 4, 2), &AdmmOptions::default());
         assert_eq!(singular.unwrap_err(), UpscaleError::Singular { k: 4 });

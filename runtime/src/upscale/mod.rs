@@ -12,7 +12,7 @@ pub use l21_admm::{AdmmInfo, AdmmOptions, UpscaleError, l21_functional_map};
 pub use least_squares::least_squares_functional_map;
 
 use crate::Matrix;
-use crate::point_map::{PointMap, RecoverError, recover_transported, transport};
+use crate::point_map::{PointMap, RecoverError, check_shape, recover_transported, transport};
 use crate::spectral::Eigenbasis;
 
 /// The values of the eigenfunctions at the matched vertices, `[m, k_source]` and `[m, k_target]`.
@@ -41,10 +41,8 @@ pub fn delta_coefficients(
 /// what is compared.
 ///
 /// # Errors
-/// If an entry of `c` or a basis is not finite.
-///
-/// # Panics
-/// If `c` or `vertices` does not fit the bases, or a match names a vertex that does not exist.
+/// If `c` or `vertices` does not fit the bases, a match names a vertex that does not exist, or an entry of `c` or a basis is
+/// not finite.
 pub fn full_point_map(
     c: &Matrix,
     basis_source: &Eigenbasis,
@@ -52,8 +50,49 @@ pub fn full_point_map(
     vertices: &[[f64; 3]],
     matches: &[(u32, u32)],
 ) -> Result<PointMap, RecoverError> {
+    check_shape(c, basis_source, basis_target)?;
+    let (n_source, n_target) = (basis_source.n(), basis_target.n());
+    if vertices.len() != n_source {
+        return Err(RecoverError::VertexCount { found: vertices.len(), expected: n_source });
+    }
+    let outside = |&(s, t): &(u32, u32)| s as usize >= n_source || t as usize >= n_target;
+    if let Some(index) = matches.iter().position(outside) {
+        let (source_vertex, target_vertex) = matches[index];
+        return Err(RecoverError::MatchOutOfRange {
+            index,
+            source_vertex,
+            target_vertex,
+            n_source,
+            n_target,
+        });
+    }
     let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
     let mut transported = transport(phi, c);
     interpolate::add_residuals(&mut transported, phi, psi, vertices, matches);
     recover_transported(&transported, basis_target)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fmap::test_basis::{identity, rectangle};
+
+    #[test]
+    fn what_does_not_fit_the_bases_is_an_error() {
+        let basis = rectangle(5, 6, 8);
+        let vertices: Vec<[f64; 3]> = (0..30).map(|i| [f64::from(i % 5), f64::from(i / 5), 0.0]).collect();
+        let map = |c: &Matrix, vertices: &[[f64; 3]], matches: &[(u32, u32)]| {
+            full_point_map(c, &basis, &basis, vertices, matches)
+        };
+        let c = identity(8);
+        assert_eq!(map(&c, &vertices, &[(0, 0), (29, 29)]).unwrap().targets, Vec::from_iter(0..30));
+        let error = map(&identity(7), &vertices, &[]).unwrap_err();
+        assert!(matches!(error, RecoverError::ShapeMismatch { rows: 7, .. }), "{error}");
+        let error = map(&c, &vertices[1..], &[]).unwrap_err();
+        assert_eq!(error, RecoverError::VertexCount { found: 29, expected: 30 });
+        for wrong in [(30, 0), (0, 30)] {
+            let error = map(&c, &vertices, &[(0, 0), wrong]).unwrap_err();
+            assert!(matches!(error, RecoverError::MatchOutOfRange { index: 1, .. }), "{error}");
+        }
+    }
 }

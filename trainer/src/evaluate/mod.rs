@@ -133,14 +133,9 @@ pub enum EvaluateError {
     /// A shape of the dataset is wrong.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// A pair could not be matched.
-    #[error("{pair}: {source}")]
-    Match {
-        /// The pair or shape.
-        pair: String,
-        /// Why.
-        source: Box<fmnet::Error>,
-    },
+    /// A shape or pair, which it names, could not be described or matched.
+    #[error(transparent)]
+    Match(Box<fmnet::Error>),
     /// A map does not fit its pair.
     #[error("{pair}: {source}")]
     Compare {
@@ -302,22 +297,20 @@ impl Maps {
                         observer(event);
                     }
                 };
+                let failed = |e| EvaluateError::Match(Box::new(e));
                 for (index, shape) in [(s, source), (t, target)] {
                     if let Entry::Vacant(slot) = described.entry(index) {
-                        let failed =
-                            |e| EvaluateError::Match { pair: shape.name.clone(), source: Box::new(e) };
                         let (name, mesh) = (&shape.name, &shape.mesh);
-                        let result = match shape.is_part {
-                            true => matcher.describe_part(name, mesh, target.area, &warnings),
-                            false => matcher.describe(name, mesh, &warnings),
+                        let result = match shape.whole_area {
+                            Some(area) => matcher.describe_part(name, mesh, area, &warnings),
+                            None => matcher.describe(name, mesh, &warnings),
                         };
                         slot.insert(result.map_err(failed)?);
                     }
                 }
                 let start = Instant::now();
-                let found = matcher.match_shapes(&described[&s], &described[&t], &warnings);
-                let pair = || format!("{} -> {}", source.name, target.name);
-                let found = found.map_err(|e| EvaluateError::Match { pair: pair(), source: Box::new(e) })?;
+                let found =
+                    matcher.match_shapes(&described[&s], &described[&t], &warnings).map_err(failed)?;
                 Ok((found.map, start.elapsed().as_secs_f64()))
             }
         }

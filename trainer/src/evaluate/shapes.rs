@@ -11,8 +11,8 @@ pub(super) struct LoadedShape {
     pub(super) name: String,
     pub(super) mesh: Mesh,
     pub(super) area: f64,
-    /// Whether it is a part of a shape.
-    pub(super) is_part: bool,
+    /// For a part of a shape, the area of the whole, in squared units of the mesh.
+    pub(super) whole_area: Option<f64>,
     /// Vertex of every point of the group.
     points: Vec<u32>,
     /// Vertex of the mirror image of every point, where the dataset knows it.
@@ -44,7 +44,7 @@ fn load_one(dataset: &Dataset, index: usize, is_target: bool) -> Result<LoadedSh
     Ok(LoadedShape {
         name: entry.name.clone(),
         area: mesh.area(),
-        is_part: entry.is_part(),
+        whole_area: entry.whole_area()?,
         points: entry.points(&mesh)?,
         mirrored: entry.mirrored_points(&mesh)?,
         solver: is_target.then(|| GeodesicSolver::new(&mesh, &GeodesicOptions::default())),
@@ -67,5 +67,41 @@ impl LoadedShape {
         let pairs = self.points.iter().zip(points_target).map(|(&s, &t)| (s, t));
         let known = pairs.filter(|&(s, t)| s != MISSING && t != MISSING).collect();
         GroundTruth::new(known, self.mesh.n_vertices(), target.mesh.n_vertices())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{Correspondence, ShapeEntry, Split};
+    use fmnet::io::{Attributes, write_mesh};
+    use fmnet::mesh::shapes::{bumpy_sphere, transformed};
+
+    #[test]
+    fn a_part_knows_the_area_of_its_own_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = bumpy_sphere(2, 1);
+        let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let larger = transformed(&whole, upright, 3.0, [0.0; 3]);
+        let part = Mesh::new(whole.vertices().to_vec(), whole.faces()[40..].to_vec()).unwrap();
+        let shapes = [("larger", &larger, false), ("part", &part, true), ("whole", &whole, false)];
+        let entry = |(name, mesh, is_part): (&str, &Mesh, bool)| {
+            let path = folder.path().join(format!("{name}.off"));
+            write_mesh(&path, mesh, &Attributes::default()).unwrap();
+            ShapeEntry {
+                name: name.into(),
+                mesh: path,
+                group: "sphere".into(),
+                correspondence: Correspondence::Identity,
+                split: Split::Test,
+                whole: is_part.then(|| folder.path().join("whole.off")),
+            }
+        };
+        let shapes = shapes.map(entry).to_vec();
+        let dataset = Dataset { layout: "test", folder: folder.path().into(), shapes };
+        let loaded = load(&dataset, &[(1, 0), (1, 2)]).unwrap();
+        let area = loaded[&1].whole_area.unwrap();
+        assert!((area / whole.area() - 1.0).abs() < 1e-6, "{area}");
+        assert_eq!([loaded[&0].whole_area, loaded[&2].whole_area], [None, None]);
     }
 }

@@ -40,10 +40,10 @@ pub struct Nearest {
 #[non_exhaustive]
 pub enum SearchError {
     /// There is no target to be near to.
-    #[error("there are no target rows to search among")]
+    #[error("there are no target rows to search among; give a target of at least one vertex")]
     NoTargets,
     /// More targets than a 32-bit index can name.
-    #[error("{n_targets} target rows are more than the {} supported", u32::MAX)]
+    #[error("{n_targets} target rows are more than the {} supported; decimate the target", u32::MAX - 1)]
     TooManyTargets {
         /// How many target rows there are.
         n_targets: usize,

@@ -23,7 +23,7 @@ mod smooth;
 mod tests;
 mod triangulation;
 
-use super::{RefineError, Refined};
+use super::{RefineError, Refined, check_bases};
 use crate::fmap::functional_map_of;
 use crate::point_map::{PointMap, cosines, transport, transposed};
 use crate::spectral::Eigenbasis;
@@ -39,10 +39,11 @@ pub struct PmfOptions {
     /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a kernel as
     /// wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.
     pub time_start: f64,
-    /// Diffusion time in the last round with a heat kernel, and that of the target's kernel throughout. Above 0, at most
-    /// `time_start`; default 3e-4.
+    /// Diffusion time in the last round with a heat kernel, and that of the embeddings `b` in which neighbours are looked for and
+    /// the rounds without one compare. Above 0, at most `time_start`; default 3e-4.
     pub time_end: f64,
-    /// Rounds with a heat kernel, the times in even steps of their logarithm. Range 0 and up, default 6.
+    /// Rounds with a heat kernel, of the same time on both shapes, the times in even steps of their logarithm. Range 0 and up,
+    /// 1 and up without `local_rounds`; default 6.
     pub heat_rounds: usize,
     /// Rounds that average by an affine fit to the nearest vertices. Range 0 and up, default 3.
     pub local_rounds: usize,
@@ -50,8 +51,8 @@ pub struct PmfOptions {
     pub neighbors_start: usize,
     /// Vertices in an affine fit in the last of these rounds. Range 4 to `neighbors_start`, default 10.
     pub neighbors_end: usize,
-    /// Targets that a source vertex can be assigned to: those nearest to where its surroundings go. Range 1 and up, default
-    /// 128; wide kernels need many.
+    /// Targets that a source vertex can be assigned to besides its present match: those nearest to where its surroundings go.
+    /// Range 1 and up, default 128; wide kernels need many.
     pub candidates: usize,
     /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
     /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
@@ -93,8 +94,9 @@ pub struct PmfHints<'a> {
 pub struct PmfInfo {
     /// The share of source vertices whose match changed in each round.
     pub changed: Vec<f64>,
-    /// Vertices that no candidate was left for, which got what was free at the end (source no larger than the target), or the
-    /// nearest target, taken or not (source larger).
+    /// Vertices without a match after the last round, as no candidate was left for them or a triangulation that was followed
+    /// does not reach them. They got what was free (source no larger than the target), or the nearest target, taken or not
+    /// (source larger).
     pub left_over: usize,
     /// The share of the source's edges that go to edges of the target, where the map follows a triangulation that both meshes
     /// have; `None` where they have none in common, or are not given.
@@ -106,10 +108,14 @@ pub struct PmfInfo {
 /// Where the source has no more vertices than the target the result is injective, hence a bijection where they have equally
 /// many. A larger source has the target's vertices assigned to its own instead, and its others go to the nearest target, taken or
 /// not. Source vertices without a match in `map` have one afterwards. The confidence is the cosine of the angle between `b(T(x))`
-/// and the average around `x`.
+/// and the last round's average around `x`.
 ///
 /// Needs a map that is right on the whole, such as ZoomOut's: the filter is local. 200 eigenfunctions are enough for shapes of
 /// 7000 vertices.
+///
+/// # Errors
+/// If an option is out of range, a basis has no eigenfunctions, descriptors or meshes are not those of the shapes, the map does
+/// not fit the bases or it matches nothing.
 pub fn pmf(
     map: &PointMap,
     basis_source: &Eigenbasis,
@@ -118,6 +124,7 @@ pub fn pmf(
     options: &PmfOptions,
 ) -> Result<Refined<PmfInfo>, RefineError> {
     check(options)?;
+    check_bases(basis_source, basis_target)?;
     check_hints(hints, basis_source.n(), basis_target.n())?;
     // Checks the point map.
     functional_map_of(map, &basis_source.truncated(1), &basis_target.truncated(1))?;
@@ -173,7 +180,7 @@ impl Embedding {
 /// The map between rounds.
 struct Filter {
     targets: Vec<u32>,
-    /// The average of `b(T(x'))` around each source vertex, `[n_source, k_target]`.
+    /// The average around each source vertex of `b(T(x'))`, in rounds with a heat kernel of `psi(T(x'))`, `[n_source, k_target]`.
     averages: Matrix,
     changed: Vec<f64>,
 }
@@ -275,6 +282,7 @@ fn check(options: &PmfOptions) -> Result<(), RefineError> {
         ("neighbors_end", options.neighbors_end, 4),
         ("neighbors_start", options.neighbors_start, options.neighbors_end),
         ("candidates", options.candidates, 1),
+        ("heat_rounds", options.heat_rounds, usize::from(options.local_rounds == 0)),
     ];
     for (option, value, least) in sizes {
         if value < least {

@@ -100,6 +100,9 @@ pub enum EigenError {
         /// Most pairs that are computed for this mesh.
         limit: usize,
     },
+    /// The mesh has no vertices.
+    #[error("the mesh has no vertices, hence no eigenpairs: check the file that it was read from")]
+    NoVertices,
     /// Stiffness and mass of different meshes.
     #[error(
         "the stiffness matrix is for {stiffness} vertices and the mass for {mass}: take both from one mesh"
@@ -191,6 +194,9 @@ pub fn eigenbasis(
         return Err(EigenError::InvalidTolerance { tolerance: options.tolerance });
     }
     let n = laplacian.n();
+    if n == 0 {
+        return Err(EigenError::NoVertices);
+    }
     let limit = if n <= DENSE_AT_MOST { n } else { n / MANY };
     if k == 0 || k > limit {
         return Err(EigenError::TooManyPairs { k, n, limit });
@@ -215,7 +221,7 @@ fn solve(pencil: &Pencil<'_>, k: usize, options: &EigenOptions) -> Result<Found,
         return Ok(Found { eigenvalues: eigenvalues[null..].to_vec(), eigenvectors, stats });
     }
     if many {
-        return Err(EigenError::TooManyPairs { k, n, limit: (n - null) / MANY });
+        return Err(EigenError::TooManyPairs { k, n, limit: null.max((n - null) / MANY) });
     }
     iterate(pencil, k, options)
 }

@@ -198,6 +198,7 @@ fn unusable_input_is_an_error() {
     assert_eq!(solve(&bumpy(8), n).0.k(), n);
     let strict = EigenOptions { tolerance: 0.0, ..options.clone() };
     assert_eq!(eigenbasis(&laplacian, 3, &strict), Err(EigenError::InvalidTolerance { tolerance: 0.0 }));
+    assert_eq!(eigenbasis(&Laplacian::new(&Mesh::default()), 2, &options), Err(EigenError::NoVertices));
     let points = Mesh::new(vec![[0.0; 3]; 5], vec![]).unwrap();
     assert!(matches!(eigenbasis(&Laplacian::new(&points), 2, &options), Err(EigenError::NoArea { .. })));
     let huge = scaled(&bumpy(8), 1e200);

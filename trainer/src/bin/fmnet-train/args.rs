@@ -63,7 +63,7 @@ pub(crate) struct SynthArgs {
     /// Individuals of each species, 2 and up
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) count: u32,
-    /// Seed: the same seed gives the same dataset
+    /// Seed, 0 to 65535: the same seed gives the same dataset
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u32,
     /// Least number of vertices of a body, 4000 up to the largest
