@@ -228,16 +228,10 @@ fn check_value(values: &[ValueInfo], name: &str) -> Result<(), String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::network::proto::{Dimension, Graph, Model, Node, Shape, StringEntry, TensorType};
-
-    /// A model whose only operator gives a value of this name.
-    fn model_giving(name: &str) -> Vec<u8> {
-        let dim = [None, Some(WIDTH as i64)].map(|value| Dimension { value }).to_vec();
-        let kind = Type { tensor: Some(TensorType { elem_type: ONNX_FLOAT, shape: Some(Shape { dim }) }) };
-        let value = |name: &str| ValueInfo { name: name.into(), kind: Some(kind.clone()) };
-        let metadata = ModelMetadata {
+impl ModelMetadata {
+    /// For tests.
+    pub(super) fn example() -> Self {
+        Self {
             format_version: 1,
             shot: ShotOptions::default(),
             k: 20,
@@ -249,7 +243,21 @@ mod tests {
             steps: 0,
             commit: String::new(),
             license: String::new(),
-        };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::proto::{Dimension, Graph, Model, Node, Shape, StringEntry, TensorType};
+
+    /// A model whose only operator gives a value of this name.
+    fn model_giving(name: &str) -> Vec<u8> {
+        let dim = [None, Some(WIDTH as i64)].map(|value| Dimension { value }).to_vec();
+        let kind = Type { tensor: Some(TensorType { elem_type: ONNX_FLOAT, shape: Some(Shape { dim }) }) };
+        let value = |name: &str| ValueInfo { name: name.into(), kind: Some(kind.clone()) };
+        let metadata = ModelMetadata::example();
         let pairs = metadata.to_pairs().into_iter();
         let model = Model {
             graph: Some(Graph {

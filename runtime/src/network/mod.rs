@@ -185,8 +185,6 @@ fn load_engine(bytes: &[u8], metadata: &ModelMetadata, backend: Backend) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::descriptor::ShotOptions;
-    use crate::fmap::FmapSolver;
 
     struct Failing;
 
@@ -198,22 +196,9 @@ mod tests {
 
     #[test]
     fn a_failure_names_the_model_file() {
-        let metadata = ModelMetadata {
-            format_version: 1,
-            shot: ShotOptions::default(),
-            k: 20,
-            solver: FmapSolver::LeastSquares,
-            decimate: None,
-            per_shape_statistics: false,
-            training_set: String::new(),
-            seed: 0,
-            steps: 0,
-            commit: String::new(),
-            license: String::new(),
-        };
         let network = DescriptorNetwork {
             path: "m.onnx".into(),
-            metadata,
+            metadata: ModelMetadata::example(),
             fingerprint: [0; 32],
             backend: Backend::Tract,
             engine: Box::new(Failing),
