@@ -42,7 +42,7 @@ fn config(data: &Path) -> TrainConfig {
         blocks: 1,
         validate_every: 2,
         validation_pairs: 2,
-        ..TrainConfig::default()
+        ..TrainConfig::paper()
     }
 }
 

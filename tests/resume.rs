@@ -23,7 +23,7 @@ fn config(data: &Path, out: &Path) -> TrainConfig {
         checkpoint_every: 2,
         validate_every: 3,
         validation_pairs: 1,
-        ..TrainConfig::default()
+        ..TrainConfig::paper()
     }
 }
 

@@ -47,7 +47,8 @@ fn described(meshes: [Mesh; 2]) -> [(Eigenbasis, Matrix); 2] {
         let (basis, _) =
             eigenbasis(&Laplacian::new(&mesh), K, &EigenOptions::default()).expect("a clean mesh");
         let (shot, _) = shot(&mesh, &ShotOptions::default()).expect("a mesh with an area");
-        let descriptors = network.descriptors(&shot).expect("rows of the right width");
+        let descriptors =
+            network.descriptors(mesh.n_vertices(), &[shot.data()]).expect("rows of the right width");
         let basis = basis.at_unit_area(K);
         let coefficients = basis.project(&descriptors);
         (basis, coefficients)

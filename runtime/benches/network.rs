@@ -22,7 +22,10 @@ fn main() {
     let (descriptors, _) = shot(&mesh, &ShotOptions::default()).expect("a mesh with an area");
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        let run = || pool.install(|| network.descriptors(&descriptors)).expect("rows of the right width");
+        let run = || {
+            pool.install(|| network.descriptors(descriptors.rows(), &[descriptors.data()]))
+                .expect("rows of the right width")
+        };
         let (cost, output) = least(report.runs(5), run);
         let case = format!("network-{n}");
         let mut figures = cost.figures();

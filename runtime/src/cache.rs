@@ -52,7 +52,7 @@ pub enum Lookup {
 }
 
 /// A folder of entries.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cache {
     folder: PathBuf,
 }

@@ -71,6 +71,7 @@
 
 pub mod cache;
 pub mod descriptor;
+pub mod diffusion_net;
 mod error;
 pub mod eval;
 pub mod events;
@@ -81,6 +82,7 @@ mod matrix;
 pub mod memory;
 pub mod mesh;
 pub mod network;
+pub mod numeric;
 pub mod pipeline;
 pub mod point_map;
 pub mod refine;

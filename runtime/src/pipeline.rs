@@ -172,7 +172,10 @@ impl Matcher {
                 options.backend,
             )?),
         };
-        let mut shape_options = network.as_ref().map(|n| n.metadata().shape_options()).unwrap_or_default();
+        let mut shape_options = network.as_ref().map_or_else(ShapeOptions::default, |n| {
+            let metadata = n.metadata();
+            ShapeOptions { decimate: metadata.decimate, k: metadata.k, shot: metadata.shot, whole_area: None }
+        });
         let model_k = shape_options.k;
         let k = options.k.unwrap_or(model_k);
         if let Some(radius) = options.shot_radius {
@@ -262,8 +265,9 @@ impl Matcher {
         {
             return Ok(DescribedShape { shape, descriptors, key });
         }
-        let descriptors = timed(observer, name, "network", || network.descriptors(&shape.shot))
-            .map_err(|e| in_shape(e.into()))?;
+        let descriptors =
+            timed(observer, name, "network", || network.descriptors(shape.n(), &[shape.shot.data()]))
+                .map_err(|e| in_shape(e.into()))?;
         if let Some(cache) = cache {
             let mut out = Encoder::default();
             out.matrix(&descriptors);

@@ -11,6 +11,7 @@ use fmnet::io::{
 };
 use fmnet::mesh::inspect;
 use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
+use fmnet::network::contract::ModelInput;
 use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet::point_map::PointMap;
 use fmnet::shape::{Shape, ShapeOptions};
@@ -20,7 +21,10 @@ use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::config::TrainConfig;
 use fmnet_trainer::dataset::{Correspondence, Dataset, ShapeEntry, Split};
 use fmnet_trainer::export::to_onnx;
-use fmnet_trainer::network::{Network, NetworkOptions};
+use fmnet_trainer::network::{
+    DiffusionNetwork, DiffusionOptions, Network, NetworkOptions, ResidualNetwork, ResidualOptions,
+    parameter_values,
+};
 use fmnet_trainer::optimizer::AdamState;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -261,20 +265,45 @@ fn matrices(folder: &Path) -> Target {
     })
 }
 
-fn small_network() -> Network {
-    Network::new(NetworkOptions { blocks: 1, ..NetworkOptions::default() }, &Device::Cpu).unwrap()
+fn small_residual() -> ResidualOptions {
+    ResidualOptions { blocks: 1, ..ResidualOptions::default() }
+}
+
+fn small_diffusion() -> DiffusionOptions {
+    DiffusionOptions {
+        blocks: 1,
+        width: 4,
+        outputs: 3,
+        eigenfunctions: 3,
+        wks_energies: 4,
+        wks_eigenfunctions: 5,
+        ..DiffusionOptions::default()
+    }
 }
 
 /// Loads and, where the file is accepted, runs it.
 fn models() -> Target {
-    let network = small_network();
-    let seeds = [true, false].map(|per_shape| to_onnx(&network, &test_metadata(per_shape)).unwrap());
-    let shot = Matrix::from_fn(3, 352, |i, j| ((i * 352 + j) as f32 * 0.1).sin().abs());
-    let target = Target::new(seeds.to_vec(), move |bytes| {
+    let network = ResidualNetwork::new(small_residual(), 1, &Device::Cpu).unwrap();
+    let diffusion = DiffusionNetwork::new(small_diffusion(), 1, &Device::Cpu).unwrap();
+    let mut seeds: Vec<Vec<u8>> =
+        [true, false].map(|per_shape| to_onnx(&network, &test_metadata(per_shape)).unwrap()).into();
+    seeds.push(to_onnx(&diffusion, &test_metadata(false)).unwrap());
+    let target = Target::new(seeds, move |bytes| {
         let network = DescriptorNetwork::from_bytes(Path::new("model.onnx"), bytes, Backend::Tract);
-        network.is_ok_and(|network| network.descriptors(&shot).is_ok())
+        network.is_ok_and(|network| runs(&network))
     });
     target.with_memory(256 << 20)
+}
+
+/// Whether the network accepts arrays of the sizes that it asks for.
+fn runs(network: &DescriptorNetwork) -> bool {
+    let n = 3;
+    let array = |input: &ModelInput| {
+        let len: usize = input.quantity.dims(input.width).iter().map(|dim| dim.unwrap_or(n)).product();
+        (0..len).map(|i| (i as f32 * 0.1).sin().abs()).collect::<Vec<f32>>()
+    };
+    let arrays: Vec<Vec<f32>> = network.contract().inputs.iter().map(array).collect();
+    network.descriptors(n, &arrays.iter().map(Vec::as_slice).collect::<Vec<_>>()).is_ok()
 }
 
 fn manifests(folder: &Path) -> Target {
@@ -313,23 +342,27 @@ fn barycentric(folder: &Path) -> Target {
 
 fn configs(folder: &Path) -> Target {
     let path: PathBuf = folder.join("config.toml");
-    Target::new(vec![TrainConfig::default().to_toml().into()], move |bytes| {
-        std::fs::write(&path, bytes).unwrap();
-        TrainConfig::read(&path).is_ok_and(|config| config.check().is_ok() || config.dataset.0.is_empty())
-    })
+    let earlier = "k = 70\nloss = \"siamese\"\nblocks = 2\n";
+    Target::new(
+        vec![TrainConfig::default().to_toml().into(), TrainConfig::paper().to_toml().into(), earlier.into()],
+        move |bytes| {
+            std::fs::write(&path, bytes).unwrap();
+            TrainConfig::read(&path).is_ok_and(|config| config.check().is_ok() || config.dataset.0.is_empty())
+        },
+    )
 }
 
 fn checkpoints(folder: &Path) -> Target {
     let path = folder.join("last.safetensors");
-    let network = small_network();
-    let parameters = network.parameter_values().unwrap();
+    let network = ResidualNetwork::new(small_residual(), 1, &Device::Cpu).unwrap();
+    let parameters = parameter_values(&network).unwrap();
     let checkpoint = Checkpoint {
-        config: TrainConfig { blocks: 1, ..TrainConfig::default() },
+        config: TrainConfig { network: NetworkOptions::Residual(small_residual()), ..TrainConfig::paper() },
         step: 3,
         best_error: f64::INFINITY,
         adam: AdamState { step: 3, first: vec![0.0; parameters.len()], second: vec![0.0; parameters.len()] },
         parameters,
-        running: network.running_statistics().to_vec(),
+        running: network.statistics(),
     };
     checkpoint.write(&path).unwrap();
     let target = Target::new(vec![std::fs::read(&path).unwrap()], move |bytes| {

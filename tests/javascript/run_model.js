@@ -1,16 +1,21 @@
-// Runs a model file on raw float32 rows of width 352: run_model.js MODEL.onnx SHOT.f32 DESCRIPTORS.f32
+// Runs a model file: run_model.js MODEL.onnx FOLDER VERTICES OUT.f32, with raw float32 FOLDER/NAME.f32 for each input.
 "use strict";
 const fs = require("fs");
+const path = require("path");
 const { createRequire } = require("module");
 const ort = createRequire(process.env.FMNET_NODE_FOLDER + "/package.json")("onnxruntime-node");
 
 async function main() {
-  const [model, shot, out] = process.argv.slice(2);
-  const bytes = fs.readFileSync(shot);
-  const values = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
+  const [model, folder, vertices, out] = process.argv.slice(2);
   const session = await ort.InferenceSession.create(model);
-  const input = new ort.Tensor("float32", values, [values.length / 352, 352]);
-  const { descriptors } = await session.run({ shot: input });
+  const inputs = {};
+  for (const name of session.inputNames) {
+    const bytes = fs.readFileSync(path.join(folder, name + ".f32"));
+    const values = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
+    const flat = name === "mass" || name === "eigenvalues";
+    inputs[name] = new ort.Tensor("float32", values, flat ? [values.length] : [+vertices, values.length / vertices]);
+  }
+  const { descriptors } = await session.run(inputs);
   fs.writeFileSync(out, Buffer.from(descriptors.data.buffer, descriptors.data.byteOffset, descriptors.data.byteLength));
 }
 

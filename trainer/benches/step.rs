@@ -8,8 +8,12 @@ mod report;
 
 use candle_core::Device;
 use fmnet::Matrix;
+use fmnet::diffusion_net::Operators;
 use fmnet_trainer::fm_layer::FmSolver;
-use fmnet_trainer::network::{Network, NetworkOptions};
+use fmnet_trainer::losses::LossOptions;
+use fmnet_trainer::network::{
+    DiffusionNetwork, DiffusionOptions, Network, NetworkInput, ResidualNetwork, ResidualOptions,
+};
 use fmnet_trainer::step::{PairBatch, ShapeBatch, StepOptions, StepRunner};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,37 +21,79 @@ use report::{Report, measured};
 use serde_json::json;
 
 const K: usize = 120;
+/// Eigenfunctions of the functional map with a DiffusionNet.
+const DIFFUSION_K: usize = 100;
+/// Points of its contrastive loss.
+const CONTRASTED: usize = 1024;
 const STEPS: usize = 8;
 
+/// Which network takes the step.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Residual,
+    Diffusion,
+}
+
 /// Random descriptors and bases: the time does not depend on the values.
-fn shape(points: usize, generator: &mut ChaCha8Rng, both_directions: bool) -> ShapeBatch {
+fn shape(kind: Kind, points: usize, generator: &mut ChaCha8Rng, distances: bool) -> ShapeBatch {
     let mut random = |low: f32, high: f32| generator.random_range(low..high);
+    let diffusion = DiffusionOptions::default();
+    let (inputs, k) = match kind {
+        Kind::Residual => (352, K),
+        Kind::Diffusion => (diffusion.inputs(), DIFFUSION_K),
+    };
+    let features = Matrix::from_fn(points, inputs, |_, _| random(0.0, 0.2));
+    let mass = vec![1.0 / points as f32; points];
+    let operators = match kind {
+        Kind::Residual => Operators::default(),
+        Kind::Diffusion => Operators {
+            mass: mass.clone(),
+            eigenvalues: (0..diffusion.eigenfunctions).map(|l| 12.6 * l as f32).collect(),
+            eigenvectors: (0..points * diffusion.eigenfunctions).map(|_| random(-1.0, 1.0)).collect(),
+            gradients_x: (0..points * diffusion.eigenfunctions).map(|_| random(-9.0, 9.0)).collect(),
+            gradients_y: (0..points * diffusion.eigenfunctions).map(|_| random(-9.0, 9.0)).collect(),
+        },
+    };
+    let drawn = if kind == Kind::Diffusion { CONTRASTED.min(points) } else { points };
     ShapeBatch {
-        shot: Matrix::from_fn(points, 352, |_, _| random(0.0, 0.2)),
-        basis: Matrix::from_fn(points, K, |_, _| random(-1.0, 1.0)),
-        mass: vec![1.0 / points as f32; points],
-        eigenvalues: (0..K).map(|l| 12.6 * l as f64).collect(),
-        distances: both_directions.then(|| Matrix::from_fn(points, points, |_, _| random(0.0, 1.5))),
+        input: NetworkInput { features, operators },
+        basis: Matrix::from_fn(points, k, |_, _| random(-1.0, 1.0)),
+        mass,
+        eigenvalues: (0..k).map(|l| 12.6 * l as f64).collect(),
+        points: (0..drawn as u32).collect(),
+        distances: distances.then(|| Matrix::from_fn(points, points, |_, _| random(0.0, 1.5))),
     }
 }
 
 /// What is optimised.
 struct Setting {
     name: &'static str,
+    kind: Kind,
     points: usize,
     solver: FmSolver,
     both_directions: bool,
 }
 
 fn run(report: &Report, setting: Setting, threads: usize) {
-    let Setting { name, points, solver, both_directions } = setting;
+    let Setting { name, kind, points, solver, both_directions } = setting;
     let mut generator = ChaCha8Rng::seed_from_u64(1);
-    let source = shape(points, &mut generator, both_directions);
-    let target = shape(points, &mut generator, true);
-    let pairs = [PairBatch { source, target, source_is_part: false, negatives: Vec::new() }];
-    let network =
-        Network::new(NetworkOptions::default(), &Device::Cpu).expect("the default network is valid");
-    let options = StepOptions { functional_map: solver, ..StepOptions::default() };
+    let residual = kind == Kind::Residual;
+    let source = shape(kind, points, &mut generator, residual && both_directions);
+    let target = shape(kind, points, &mut generator, residual);
+    let truth = Matrix::from_fn(DIFFUSION_K, DIFFUSION_K, |i, j| if i == j { 1.0 } else { 0.0 });
+    let ground_truth = (!residual).then(|| [truth.clone(), truth]);
+    let pairs = [PairBatch { source, target, ground_truth, ..PairBatch::default() }];
+    let (network, loss): (Box<dyn Network>, LossOptions) = match kind {
+        Kind::Residual => {
+            let network = ResidualNetwork::new(ResidualOptions::default(), 0, &Device::Cpu);
+            (Box::new(network.expect("the default network is valid")), LossOptions::soft_error())
+        }
+        Kind::Diffusion => {
+            let network = DiffusionNetwork::new(DiffusionOptions::default(), 0, &Device::Cpu);
+            (Box::new(network.expect("the default network is valid")), LossOptions::default())
+        }
+    };
+    let options = StepOptions { functional_map: solver, loss, ..StepOptions::default() };
     let mut runner = StepRunner::new(network, options).expect("the optimiser fits its network");
     let mut step = || measured(|| runner.step(&pairs, 1e-3).expect("a step on random data succeeds")).0;
     step();
@@ -64,7 +110,7 @@ fn run(report: &Report, setting: Setting, threads: usize) {
         "{name}, {points} points, {threads} threads: {least:.3} s, median {median:.3} s, CPU {cpu:.3} s"
     );
     let figures = json!({
-        "points": points, "k": K, "threads": threads, "seconds": least, "median_seconds": median, "cpu_seconds": cpu,
+        "points": points, "k": pairs[0].source.eigenvalues.len(), "threads": threads, "seconds": least, "median_seconds": median, "cpu_seconds": cpu,
         "peak_mb": peak_mb,
     });
     report.figure(&line, &format!("step-{name}"), figures);
@@ -76,12 +122,13 @@ fn main() {
         let pool =
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| {
-            for (name, points, solver, both_directions) in [
-                ("least squares", 1500, FmSolver::least_squares(), false),
-                ("regularised", 1000, FmSolver::regularized(), false),
-                ("regularised, both directions", 1000, FmSolver::regularized(), true),
+            for (name, kind, points, solver, both_directions) in [
+                ("least squares", Kind::Residual, 1500, FmSolver::least_squares(), false),
+                ("regularised", Kind::Residual, 1000, FmSolver::regularized(), false),
+                ("regularised, both directions", Kind::Residual, 1000, FmSolver::regularized(), true),
+                ("diffusion net", Kind::Diffusion, 5000, FmSolver::regularized(), true),
             ] {
-                run(&report, Setting { name, points, solver, both_directions }, threads);
+                run(&report, Setting { name, kind, points, solver, both_directions }, threads);
             }
         });
     }

@@ -2,9 +2,8 @@
 
 use crate::dataset::Split;
 use crate::fm_layer::FmSolver;
-use crate::loss::LossOptions;
-use crate::network::{Activation, NetworkOptions, Normalization};
-use crate::soft_map::ColumnNorm;
+use crate::losses::LossOptions;
+use crate::network::{DiffusionOptions, NetworkOptions, ResidualOptions};
 use crate::step::StepOptions;
 use fmnet::descriptor::ShotOptions;
 use fmnet::fmap::FmapSolver;
@@ -15,6 +14,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
 
+mod earlier;
+
 /// How points of a minibatch are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -23,16 +24,6 @@ pub enum Sampling {
     Uniform,
     /// With probability proportional to the vertex's area, so that dense regions do not dominate (the paper, for scans).
     Area,
-}
-
-/// What is minimised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum LossKind {
-    /// The soft error of the soft correspondence (the paper's equations "soft_corr" and "lossf").
-    Soft,
-    /// The contrastive loss without the functional map (the paper's equation "siam").
-    Siamese,
 }
 
 /// The solver of the functional map inside the training.
@@ -80,11 +71,15 @@ macro_rules! train_config {
         #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
         pub struct TrainConfig {
             $( $(#[doc = $doc])+ pub $name: $kind, )*
+            /// The table `[network]`.
+            pub network: NetworkOptions,
+            /// The table `[loss]`.
+            pub loss: LossOptions,
         }
 
         impl Default for TrainConfig {
             fn default() -> Self {
-                Self { $( $name: $default, )* }
+                Self { $( $name: $default, )* network: NetworkOptions::default(), loss: LossOptions::default() }
             }
         }
 
@@ -92,12 +87,19 @@ macro_rules! train_config {
         #[derive(Clone, Debug, Default, clap::Args)]
         pub struct TrainOverrides {
             $( $(#[doc = $doc])+ #[arg(long $(, short = $short)?)] pub $name: Option<$kind>, )*
+            /// Any setting by its name in the file, as in `--set loss.spectral=0.1` or `--set network.kind=residual`; may be given
+            /// several times
+            #[arg(long, value_name = "NAME=VALUE")] pub set: Vec<String>,
         }
 
         impl TrainOverrides {
             /// Replaces the settings that were given on the command line.
-            pub fn apply(self, config: &mut TrainConfig) {
+            ///
+            /// # Errors
+            /// If a setting of `set` does not exist, or its value is of another type.
+            pub fn apply(self, config: &mut TrainConfig) -> Result<(), ConfigError> {
                 $( if let Some(value) = self.$name { config.$name = value; } )*
+                self.set.iter().try_for_each(|setting| config.set(setting))
             }
         }
     };
@@ -116,12 +118,12 @@ train_config! {
     steps: u64 = 3000,
     /// Pairs in a minibatch, 1 or more; their gradients are averaged
     pairs: usize = 1,
-    /// Points in a minibatch, at most, k or more; the paper uses about 1500
-    points: usize = 1000,
+    /// Corresponding points in a minibatch, at most; k or more for the residual network; the paper uses about 1500
+    points: usize = 1024,
     /// Points of each group between which geodesic distances are computed beforehand, 100 or more
     pool: usize = 2500,
-    /// Eigenfunctions of each shape, 1 to 352
-    k ('k'): usize = 120,
+    /// Eigenfunctions of the functional map, 1 to 352
+    k ('k'): usize = 100,
     /// Meshes of more vertices are decimated to so many, 500 or more; 0: never
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area), between 0 and 1
@@ -130,20 +132,6 @@ train_config! {
     solver: SolverKind = SolverKind::Regularized,
     /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T, 0 or more
     mask_weight: f64 = 0.1,
-    /// What is minimised
-    loss: LossKind = LossKind::Soft,
-    /// The norm that columns of the soft correspondence are divided by
-    column_norm: ColumnNorm = ColumnNorm::L2,
-    /// Siamese loss: margin of dissimilar points, above 0
-    margin: f64 = 1.0,
-    /// Siamese loss: share of similar points against dissimilar ones, 0 to 1
-    gamma: f64 = 0.5,
-    /// Residual blocks, 1 to 64
-    blocks: usize = 7,
-    /// Normalisation inside the residual blocks
-    normalization: Normalization = Normalization::PerShape,
-    /// Activation inside the residual blocks
-    activation: Activation = Activation::Elu,
     /// How points are drawn
     sampling: Sampling = Sampling::Uniform,
     /// Each point is replaced by one of so many nearest vertices, 1 (none) to 100; the paper uses 10 for scans
@@ -151,9 +139,9 @@ train_config! {
     /// Learning rate of Adam at the beginning, above 0
     learning_rate: f64 = 1e-3,
     /// Learning rate at the end, 0 or more; it falls along a half cosine
-    final_learning_rate: f64 = 1e-5,
+    final_learning_rate: f64 = 3e-5,
     /// Gradients of a larger norm are scaled down to it, 0 or more; 0: never
-    clip: f64 = 0.0,
+    clip: f64 = 5.0,
     /// Seed of the initialisation, the pools and the minibatches
     seed: u64 = 1,
     /// Minibatches between checkpoints, 1 or more
@@ -183,6 +171,17 @@ pub enum ConfigError {
         /// What is wrong, and on which line.
         reason: String,
     },
+    /// A setting of `--set` cannot be used.
+    #[error("--set {setting}: {reason}")]
+    Set {
+        /// The setting and its value, as given.
+        setting: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A setting of the network is out of its range.
+    #[error("network: {0}")]
+    Network(String),
     /// A value is out of its range.
     #[error("{name} is {value}, but must be {expected}")]
     Range {
@@ -204,8 +203,66 @@ impl TrainConfig {
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Read { path: path.to_path_buf(), source })?;
-        toml::from_str(&text)
-            .map_err(|e| ConfigError::Parse { path: path.to_path_buf(), reason: e.to_string() })
+        Self::parse(&text).map_err(|reason| ConfigError::Parse { path: path.to_path_buf(), reason })
+    }
+
+    /// Reads the text of a TOML file, also one of a version that had no tables for network and losses.
+    ///
+    /// # Errors
+    /// The reason, if it is no TOML, or has an unknown setting or one of another type.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let table: toml::Table = toml::from_str(text).map_err(|e| e.to_string())?;
+        match earlier::is_earlier(&table) {
+            true => earlier::migrated(table)?.try_into().map_err(|e: toml::de::Error| e.to_string()),
+            // From the text itself, so that the message names the line.
+            false => toml::from_str(text).map_err(|e| e.to_string()),
+        }
+    }
+
+    /// The paper's network, loss and settings.
+    pub fn paper() -> Self {
+        Self {
+            points: 1000,
+            k: 120,
+            final_learning_rate: 1e-5,
+            clip: 0.0,
+            network: NetworkOptions::Residual(ResidualOptions::default()),
+            loss: LossOptions::soft_error(),
+            ..Self::default()
+        }
+    }
+
+    /// Replaces the setting of a text `name=value`, where the name of a setting in a table is `table.name`.
+    ///
+    /// # Errors
+    /// If there is no such setting, or the value is of another type.
+    pub fn set(&mut self, setting: &str) -> Result<(), ConfigError> {
+        let wrong = |reason: String| ConfigError::Set { setting: setting.to_string(), reason };
+        let (name, value) =
+            setting.split_once('=').ok_or_else(|| wrong("expected NAME=VALUE".to_string()))?;
+        // A word without quotes is a text.
+        let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
+        let value = parsed.ok().and_then(|mut table| table.remove("value"));
+        let value = value.unwrap_or_else(|| toml::Value::String(setting[name.len() + 1..].to_string()));
+        let mut table = toml::Table::try_from(&*self).expect("plain data serialises");
+        if name == "network.kind" {
+            // The settings of another kind of network do not fit.
+            table.insert("network".into(), toml::Value::Table(toml::Table::new()));
+        }
+        let mut place = &mut table;
+        let mut parts = name.split('.').peekable();
+        while let Some(part) = parts.next() {
+            if parts.peek().is_none() {
+                place.insert(part.to_string(), value);
+                break;
+            }
+            place = match place.get_mut(part) {
+                Some(toml::Value::Table(inner)) => inner,
+                _ => return Err(wrong(format!("there is no table {part:?}"))),
+            };
+        }
+        *self = table.try_into().map_err(|e: toml::de::Error| wrong(e.message().to_string()))?;
+        Ok(())
     }
 
     /// The whole configuration as TOML.
@@ -229,12 +286,15 @@ impl TrainConfig {
         range("pairs", self.pairs > 0, &self.pairs, "1 or more")?;
         range("pool", self.pool >= 100, &self.pool, "100 or more")?;
         range("k", (1..=352).contains(&self.k), &self.k, "from 1 to 352, the width of the descriptors")?;
-        range(
-            "points",
-            self.points >= self.k,
-            &self.points,
-            "k or more, else the points cannot tell k functions apart",
-        )?;
+        if matches!(self.network, NetworkOptions::Residual(_)) {
+            range(
+                "points",
+                self.points >= self.k,
+                &self.points,
+                "k or more, else the points cannot tell k functions apart",
+            )?;
+        }
+        range("points", self.points >= 2, &self.points, "2 or more")?;
         range(
             "decimate",
             self.decimate == 0 || self.decimate >= 500,
@@ -248,9 +308,21 @@ impl TrainConfig {
             "between 0 and 1",
         )?;
         range("mask-weight", at_least_0(self.mask_weight), &self.mask_weight, "a finite number, 0 or more")?;
-        range("gamma", (0.0..=1.0).contains(&self.gamma), &self.gamma, "from 0 to 1")?;
-        range("margin", above_0(self.margin), &self.margin, "a finite number above 0")?;
-        range("blocks", (1..=64).contains(&self.blocks), &self.blocks, "from 1 to 64")?;
+        let loss = &self.loss;
+        range("loss.gamma", (0.0..=1.0).contains(&loss.gamma), &loss.gamma, "from 0 to 1")?;
+        range("loss.margin", above_0(loss.margin), &loss.margin, "a finite number above 0")?;
+        range("loss.temperature", above_0(loss.temperature), &loss.temperature, "a finite number above 0")?;
+        for (name, weight) in loss.weights() {
+            range(
+                name,
+                at_least_0(weight),
+                &weight,
+                "a finite number, 0 or more: it is the weight of a loss",
+            )?;
+        }
+        let total: f64 = loss.weights().iter().map(|(_, weight)| weight).sum();
+        range("loss", total > 0.0, &"all of weight 0", "one weight above 0 at least")?;
+        self.network.check().map_err(ConfigError::Network)?;
         range("jitter", (1..=100).contains(&self.jitter), &self.jitter, "from 1 (none) to 100")?;
         range("learning-rate", above_0(self.learning_rate), &self.learning_rate, "a finite number above 0")?;
         range(
@@ -271,22 +343,20 @@ impl TrainConfig {
 
     /// How shapes are processed.
     pub fn shape_options(&self) -> ShapeOptions {
+        let eigenpairs = self.diffusion().map_or(0, DiffusionOptions::eigenpairs);
         ShapeOptions {
             decimate: Some(self.decimate).filter(|&n| n > 0),
-            k: self.k,
+            k: self.k.max(eigenpairs),
             shot: ShotOptions { radius: self.shot_radius, ..ShotOptions::default() },
             whole_area: None,
         }
     }
 
-    /// What the network looks like.
-    pub fn network_options(&self) -> NetworkOptions {
-        NetworkOptions {
-            blocks: self.blocks,
-            activation: self.activation,
-            normalization: self.normalization,
-            seed: self.seed,
-            ..NetworkOptions::default()
+    /// The settings of the DiffusionNet; `None` for the residual network.
+    pub fn diffusion(&self) -> Option<&DiffusionOptions> {
+        match &self.network {
+            NetworkOptions::Diffusion(options) => Some(options),
+            NetworkOptions::Residual(_) => None,
         }
     }
 
@@ -296,12 +366,8 @@ impl TrainConfig {
             SolverKind::LeastSquares => FmSolver::least_squares(),
             SolverKind::Regularized => FmSolver::Regularized { weight: self.mask_weight },
         };
-        let loss = match self.loss {
-            LossKind::Soft => LossOptions::SoftError { norm: self.column_norm },
-            LossKind::Siamese => LossOptions::Siamese { gamma: self.gamma, margin: self.margin },
-        };
         let clip = Some(self.clip).filter(|&clip| clip > 0.0);
-        StepOptions { functional_map, loss, clip, ..StepOptions::default() }
+        StepOptions { functional_map, loss: self.loss.clone(), clip, ..StepOptions::default() }
     }
 
     /// The solver in the runtime's terms.
@@ -367,8 +433,9 @@ mod tests {
         for wrong in [-1.0, f64::NAN, f64::INFINITY] {
             named("clip", &|c| c.clip = wrong);
             named("mask-weight", &|c| c.mask_weight = wrong);
-            named("margin", &|c| c.margin = wrong);
-            named("gamma", &|c| c.gamma = wrong);
+            named("loss.margin", &|c| c.loss.margin = wrong);
+            named("loss.gamma", &|c| c.loss.gamma = wrong);
+            named("spectral", &|c| c.loss.spectral = wrong);
             named("shot-radius", &|c| c.shot_radius = wrong);
             named("learning-rate", &|c| c.learning_rate = wrong);
             named("final-learning-rate", &|c| c.final_learning_rate = wrong);
@@ -380,7 +447,20 @@ mod tests {
     #[test]
     fn the_command_line_wins_over_the_file() {
         let mut config = TrainConfig { k: 70, ..Default::default() };
-        TrainOverrides { k: Some(50), ..Default::default() }.apply(&mut config);
-        assert_eq!((config.k, config.points), (50, 1000));
+        TrainOverrides { k: Some(50), ..Default::default() }.apply(&mut config).unwrap();
+        assert_eq!((config.k, config.points), (50, 1024));
+        let set = |settings: &[&str]| TrainOverrides {
+            set: settings.iter().map(ToString::to_string).collect(),
+            ..Default::default()
+        };
+        set(&["loss.spectral=0.5", "network.width=64", "solver=least-squares"]).apply(&mut config).unwrap();
+        assert_eq!((config.loss.spectral, config.solver), (0.5, SolverKind::LeastSquares));
+        assert_eq!(config.diffusion().unwrap().width, 64);
+        set(&["network.kind=residual", "network.blocks=3"]).apply(&mut config).unwrap();
+        assert!(matches!(&config.network, NetworkOptions::Residual(options) if options.blocks == 3));
+        for wrong in ["loss.spectrum=1", "nothing.here=1", "loss.spectral=many", "k"] {
+            let error = set(&[wrong]).apply(&mut config).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("--set {wrong}: ")), "{error}");
+        }
     }
 }

@@ -11,7 +11,7 @@
 //! | which pair and which points make minibatch `b` | [`sampler`] |
 //! | residual blocks on SHOT descriptors | [`network`] |
 //! | `C` from the projected descriptors, with its gradient | [`fm_layer`] |
-//! | the soft correspondence and its error; the siamese loss | [`soft_map`], [`loss`] |
+//! | the soft correspondence and its error; the siamese loss | [`soft_map`], [`losses`] |
 //! | one minibatch, forward and backward; Adam | [`step`], [`optimizer`] |
 //! | the loop: resume, validation, checkpoints | [`train`](mod@train), [`validate`], [`checkpoint`] |
 //! | statistics folded, graph and metadata written | [`export`] |
@@ -43,7 +43,7 @@ pub mod evaluate;
 pub mod events;
 pub mod export;
 pub mod fm_layer;
-pub mod loss;
+pub mod losses;
 pub mod network;
 mod numeric;
 pub mod optimizer;

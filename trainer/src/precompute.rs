@@ -1,5 +1,8 @@
-//! What training needs of each shape, computed once: basis, SHOT, the points of its group and the geodesic distances between
-//! a pool of them.
+//! What training needs of each shape, computed once and kept on disk: eigenbasis, gradients, SHOT, the points of its group
+//! and the geodesic distances between a pool of them.
+//!
+//! Only points, pools and the place of the arrays stay in memory; a minibatch reads the arrays of its two shapes
+//! ([`PreparedShape::arrays`]), so that there may be more shapes than memory.
 //!
 //! A full matrix of distances would take 900 MB at 15K vertices. The loss only compares points of a minibatch, so each group of
 //! shapes gets a random pool of points, from which its minibatches are drawn. Distances are kept as 16-bit numbers, in steps
@@ -9,8 +12,9 @@ use crate::dataset::{DatasetError, MISSING, ShapeEntry};
 use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
 use fmnet::events::{Observer, timed};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::mesh::{Topology, nearest_vertices};
+use fmnet::mesh::{Topology, nearest_k_vertices, nearest_vertices};
 use fmnet::shape::{Shape, ShapeOptions};
+use fmnet::spectral::eigen_gradients;
 use fmnet::{Error, Matrix, Mesh};
 use rand::SeedableRng;
 use rand::seq::index;
@@ -22,33 +26,60 @@ use thiserror::Error;
 pub struct PrepareOptions {
     /// Decimation, basis and descriptor.
     pub shape: ShapeOptions,
+    /// Eigenfunctions whose gradients are computed, at most as many as the shape has; 0: none.
+    pub gradients: usize,
+    /// Whether SHOT descriptors are kept.
+    pub shot: bool,
+    /// Whether geodesic distances between the points of the pools are computed.
+    pub distances: bool,
     /// Points in the pool of a group. Range 100 and up.
     pub pool: usize,
     /// Seed of the pools.
     pub seed: u64,
 }
 
-/// A shape ready for training or validation.
+/// A shape as the runtime processed it, and where the points of its group lie on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProcessedShape {
+    /// Where it comes from.
+    pub entry: ShapeEntry,
+    /// Mesh, basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area, a part as its whole
+    /// ([`Shape::unit_basis`]).
+    pub shape: Shape,
+    /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
+    pub points: Vec<u32>,
+}
+
+/// A shape ready for training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PreparedShape {
     /// Where it comes from.
     pub entry: ShapeEntry,
-    /// Basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area, a part as its whole
-    /// ([`Shape::unit_basis`]): minibatches and maps need no other.
-    pub shape: Shape,
     /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
     /// Distances between the points of its pool.
     pub pool: Pool,
+    /// For each point the working vertices nearest to its own, `[points, jitter]`; empty where there is no jitter.
+    pub jitter: Vec<u32>,
+    cache: Cache,
+    key: CacheKey,
 }
 
-/// The points of its group's pool that a shape has, and the geodesic distances between them.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct Pool {
-    /// The points, ascending, `[m]`; all on one component of the shape.
-    pub points: Vec<u32>,
-    /// Row by row, `[m, m]`; empty for a part of a shape, whose distances go around its holes.
-    distances: Vec<u16>,
+/// What a network and a functional map need of a shape, at unit area.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShapeArrays {
+    /// Vertex areas, `[n]`.
+    pub mass: Vec<f32>,
+    /// Eigenvalues, `[k]`.
+    pub eigenvalues: Vec<f64>,
+    /// Eigenvectors, `[n, k]`.
+    pub eigenvectors: Matrix<f32>,
+    /// Gradients of the first eigenvectors, `[n, gradients]`.
+    pub gradients_x: Matrix<f32>,
+    /// Along the second axis.
+    pub gradients_y: Matrix<f32>,
+    /// SHOT, `[n, 352]`; empty where no network takes it.
+    pub shot: Matrix<f32>,
 }
 
 /// Why a shape could not be prepared.
@@ -60,40 +91,155 @@ pub enum PrepareError {
     /// The mesh could not be processed.
     #[error(transparent)]
     Shape(#[from] Error),
+    /// What was prepared is not there any more.
+    #[error(
+        "{shape}: its entry in the cache, {path}, is gone or damaged; run the same command again, which prepares it anew"
+    )]
+    Gone {
+        /// Name of the shape.
+        shape: String,
+        /// The entry's file.
+        path: String,
+    },
 }
 
 /// Reads and processes one shape; results are looked up in the cache and left there.
 ///
 /// # Errors
 /// If the shape's files cannot be read or do not fit together, it cannot be processed, or the cache cannot be written.
+pub fn process(
+    entry: &ShapeEntry,
+    options: &ShapeOptions,
+    cache: Option<&Cache>,
+    observer: Observer,
+) -> Result<ProcessedShape, PrepareError> {
+    Ok(process_with_key(entry, options, cache, observer)?.0)
+}
+
+fn process_with_key(
+    entry: &ShapeEntry,
+    options: &ShapeOptions,
+    cache: Option<&Cache>,
+    observer: Observer,
+) -> Result<(ProcessedShape, CacheKey), PrepareError> {
+    let mesh = entry.read()?;
+    let options = ShapeOptions { whole_area: entry.whole_area()?, ..options.clone() };
+    let mut shape = Shape::process_cached(&entry.name, &mesh, &options, cache, observer)?;
+    shape.basis = shape.unit_basis(shape.basis.k());
+    let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
+    let key = CacheKey::of(&[Shape::cache_key(&mesh, &options).as_bytes(), bytemuck::cast_slice(&points)]);
+    Ok((ProcessedShape { entry: entry.clone(), shape, points }, key))
+}
+
+/// [`process`], and everything that minibatches need, which goes to the cache.
+///
+/// # Errors
+/// As [`process`].
 pub fn prepare(
     entry: &ShapeEntry,
     options: &PrepareOptions,
-    cache: Option<&Cache>,
+    jitter: usize,
+    cache: &Cache,
     observer: Observer,
 ) -> Result<PreparedShape, PrepareError> {
-    let mesh = entry.read()?;
-    let shape_options = ShapeOptions { whole_area: entry.whole_area()?, ..options.shape.clone() };
-    let mut shape = Shape::process_cached(&entry.name, &mesh, &shape_options, cache, observer)?;
-    shape.basis = shape.unit_basis(shape.basis.k());
-    let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
-    let key = CacheKey::of(&[
-        Shape::cache_key(&mesh, &shape_options).as_bytes(),
-        bytemuck::cast_slice(&points),
-        &options.pool.to_le_bytes(),
-        &options.seed.to_le_bytes(),
-        entry.group.as_bytes(),
-    ]);
-    if let Some(pool) =
-        cache.and_then(|cache| cache.fetch("pool", key, observer)).and_then(|b| Pool::decode(&b))
-    {
-        return Ok(PreparedShape { entry: entry.clone(), shape, points, pool });
+    let (processed, key) = process_with_key(entry, &options.shape, Some(cache), observer)?;
+    let flags = [options.gradients as u64, u64::from(options.shot)];
+    let arrays_key = CacheKey::of(&[key.as_bytes(), bytemuck::cast_slice(&flags)]);
+    if cache.fetch(ARRAYS, arrays_key, observer).and_then(|bytes| ShapeArrays::decode(&bytes)).is_none() {
+        let arrays = timed(observer, &entry.name, "operators", || ShapeArrays::of(&processed.shape, options));
+        cache.put(ARRAYS, arrays_key, &arrays.encode()).map_err(Error::from)?;
     }
-    let pool = timed(observer, &entry.name, "geodesics", || Pool::compute(entry, &shape, &points, options));
-    if let Some(cache) = cache {
-        cache.put("pool", key, &pool.encode()).map_err(Error::from)?;
+    let pool = Pool::cached(&processed, key, options, cache, observer)?;
+    let jitter = jitter_neighbors(&processed, jitter);
+    let ProcessedShape { entry, points, .. } = processed;
+    Ok(PreparedShape { entry, points, pool, jitter, cache: cache.clone(), key: arrays_key })
+}
+
+/// Kind of the cache's entries of [`ShapeArrays`].
+const ARRAYS: &str = "arrays";
+
+impl PreparedShape {
+    /// Reads the arrays from the cache.
+    ///
+    /// # Errors
+    /// If they are not there any more.
+    pub fn arrays(&self) -> Result<ShapeArrays, PrepareError> {
+        let bytes = self.cache.fetch(ARRAYS, self.key, &fmnet::events::ignore);
+        bytes.and_then(|bytes| ShapeArrays::decode(&bytes)).ok_or_else(|| PrepareError::Gone {
+            shape: self.entry.name.clone(),
+            path: self.cache.path(ARRAYS, self.key).display().to_string(),
+        })
     }
-    Ok(PreparedShape { entry: entry.clone(), shape, points, pool })
+}
+
+impl ShapeArrays {
+    /// The arrays of a shape whose basis is at unit area.
+    pub fn of(shape: &Shape, options: &PrepareOptions) -> Self {
+        let basis = &shape.basis;
+        let single = |matrix: &Matrix| matrix.map(|x| x as f32);
+        let (mut gradients_x, mut gradients_y) = (Matrix::default(), Matrix::default());
+        if options.gradients > 0 {
+            let first = basis.truncated(options.gradients.min(basis.k()));
+            // At unit area lengths are in units of sqrt(area).
+            let unit = (shape.mesh().area() / basis.area()).sqrt();
+            let gradients = eigen_gradients(shape.mesh(), &first);
+            let scaled = |matrix: &Matrix| matrix.map(|x| (x * unit) as f32);
+            (gradients_x, gradients_y) = (scaled(&gradients.x), scaled(&gradients.y));
+        }
+        Self {
+            mass: basis.mass.iter().map(|&m| m as f32).collect(),
+            eigenvalues: basis.eigenvalues.clone(),
+            eigenvectors: single(&basis.eigenvectors),
+            gradients_x,
+            gradients_y,
+            shot: if options.shot { shape.shot.clone() } else { Matrix::default() },
+        }
+    }
+
+    /// Number of vertices.
+    pub fn n(&self) -> usize {
+        self.mass.len()
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut out = Encoder::default();
+        out.slice(&self.mass).slice(&self.eigenvalues);
+        out.matrix(&self.eigenvectors).matrix(&self.gradients_x).matrix(&self.gradients_y).matrix(&self.shot);
+        out.finish()
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let mut input = Decoder::new(bytes);
+        Some(Self {
+            mass: input.slice()?,
+            eigenvalues: input.slice()?,
+            eigenvectors: input.matrix()?,
+            gradients_x: input.matrix()?,
+            gradients_y: input.matrix()?,
+            shot: input.matrix()?,
+        })
+    }
+}
+
+/// For each point the vertices nearest to its own, `[points, jitter]`; empty where there is no jitter.
+fn jitter_neighbors(processed: &ProcessedShape, jitter: usize) -> Vec<u32> {
+    if jitter <= 1 {
+        return Vec::new();
+    }
+    let vertices = processed.shape.mesh().vertices();
+    let position = |&v: &u32| vertices[if v == MISSING { 0 } else { v as usize }];
+    let positions: Vec<[f64; 3]> = processed.points.iter().map(position).collect();
+    nearest_k_vertices(vertices, &positions, jitter)
+}
+
+/// The points of its group's pool that a shape has, and the geodesic distances between them.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Pool {
+    /// The points, ascending, `[m]`; all on one component of the shape.
+    pub points: Vec<u32>,
+    /// Row by row, `[m, m]`; empty where no loss needs them, and for a part of a shape, whose distances go
+    /// around its holes.
+    distances: Vec<u16>,
 }
 
 /// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the nearest.
@@ -136,12 +282,34 @@ impl Pool {
     /// Steps of the stored distances for one unit, sqrt(area).
     const STEPS: f32 = 16_384.0;
 
+    fn cached(
+        processed: &ProcessedShape,
+        shape_key: CacheKey,
+        options: &PrepareOptions,
+        cache: &Cache,
+        observer: Observer,
+    ) -> Result<Self, PrepareError> {
+        let numbers = [options.pool as u64, options.seed, u64::from(options.distances)];
+        let key = CacheKey::of(&[
+            shape_key.as_bytes(),
+            bytemuck::cast_slice(&numbers),
+            processed.entry.group.as_bytes(),
+        ]);
+        if let Some(pool) = cache.fetch("pool", key, observer).and_then(|bytes| Self::decode(&bytes)) {
+            return Ok(pool);
+        }
+        let ProcessedShape { entry, shape, points } = processed;
+        let pool = timed(observer, &entry.name, "pool", || Self::compute(entry, shape, points, options));
+        cache.put("pool", key, &pool.encode()).map_err(Error::from)?;
+        Ok(pool)
+    }
+
     fn compute(entry: &ShapeEntry, shape: &Shape, points: &[u32], options: &PrepareOptions) -> Self {
         let has = |&point: &u32| points[point as usize] != MISSING;
         let mut chosen: Vec<u32> =
             group_pool(&entry.group, points.len(), options).into_iter().filter(has).collect();
         keep_main_component(shape.mesh(), points, &mut chosen);
-        if entry.is_part() {
+        if entry.is_part() || !options.distances {
             return Self { points: chosen, distances: Vec::new() };
         }
         let vertices: Vec<u32> = chosen.iter().map(|&p| points[p as usize]).collect();
@@ -163,8 +331,8 @@ impl Pool {
         self.points.is_empty()
     }
 
-    /// Distances between some points of the pool, `[q]`, as `[q, q]` in units of sqrt(area), at most 4; none for a part of
-    /// a shape.
+    /// Distances between some points of the pool, `[q]`, as `[q, q]` in units of sqrt(area), at most 4; none where they were
+    /// not computed.
     ///
     /// # Panics
     /// If a point is not in the pool.

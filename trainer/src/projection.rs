@@ -33,32 +33,25 @@ impl<T: Real> WeightedBasis<T> {
     }
 }
 
-/// Projects the rows of `descriptors` `[m_source + m_target, q]` on the two bases: `[k_source + k_target, q]`, source first.
-pub(crate) fn project<T: Real>(descriptors: &Tensor, bases: [WeightedBasis<T>; 2]) -> Result<Tensor> {
+/// Projects the rows of `descriptors` `[m, q]` on the basis: `[k, q]`.
+pub(crate) fn project<T: Real>(descriptors: &Tensor, basis: WeightedBasis<T>) -> Result<Tensor> {
     let (rows, q) = descriptors.dims2()?;
-    if rows != bases[0].points + bases[1].points {
-        bail!("{rows} descriptors for {} and {} points", bases[0].points, bases[1].points);
+    if rows != basis.points {
+        bail!("{rows} descriptors for {} points", basis.points);
     }
     if descriptors.device().is_cpu() {
-        return descriptors.contiguous()?.apply_op1(Projection { bases, q });
+        return descriptors.contiguous()?.apply_op1(Projection { basis, q });
     }
-    composed(descriptors, bases)
+    composed(descriptors, basis)
 }
 
 /// The same from Candle's own ops, for devices other than the CPU.
-fn composed<T: Real>(descriptors: &Tensor, bases: [WeightedBasis<T>; 2]) -> Result<Tensor> {
-    let mut start = 0;
-    let mut parts = Vec::with_capacity(2);
-    for basis in bases {
-        let matrix = Tensor::from_vec(basis.data, (basis.points, basis.k), descriptors.device())?;
-        parts.push(matrix.t()?.matmul(&descriptors.narrow(0, start, basis.points)?)?);
-        start += basis.points;
-    }
-    Tensor::cat(&parts, 0)
+fn composed<T: Real>(descriptors: &Tensor, basis: WeightedBasis<T>) -> Result<Tensor> {
+    Tensor::from_vec(basis.data, (basis.points, basis.k), descriptors.device())?.t()?.matmul(descriptors)
 }
 
 struct Projection<T> {
-    bases: [WeightedBasis<T>; 2],
+    basis: WeightedBasis<T>,
     q: usize,
 }
 
@@ -69,26 +62,20 @@ impl<T: Real> CustomOp1 for Projection<T> {
 
     fn cpu_fwd(&self, storage: &CpuStorage, layout: &Layout) -> Result<(CpuStorage, Shape)> {
         let data: &[T] = contiguous(storage, layout)?;
-        let [source, target] = &self.bases;
-        let mut out = vec![T::zero(); (source.k + target.k) * self.q];
-        let (data_source, data_target) = data.split_at(source.points * self.q);
-        let (out_source, out_target) = out.split_at_mut(source.k * self.q);
-        for (basis, data, out) in [(source, data_source, out_source), (target, data_target, out_target)] {
-            let data = MatrixView::new(data, basis.points, self.q);
-            matmul_split(out, basis.view().t(), data, PIECES);
-        }
-        Ok((T::to_cpu_storage_owned(out), Shape::from((source.k + target.k, self.q))))
+        let mut out = vec![T::ZERO; self.basis.k * self.q];
+        matmul_split(
+            &mut out,
+            self.basis.view().t(),
+            MatrixView::new(data, self.basis.points, self.q),
+            PIECES,
+        );
+        Ok((T::to_cpu_storage_owned(out), Shape::from((self.basis.k, self.q))))
     }
 
     fn bwd(&self, descriptors: &Tensor, _out: &Tensor, grad: &Tensor) -> Result<Option<Tensor>> {
-        let [source, target] = &self.bases;
-        let mut out = vec![T::zero(); (source.points + target.points) * self.q];
-        let (out_source, out_target) = out.split_at_mut(source.points * self.q);
+        let mut out = vec![T::ZERO; self.basis.points * self.q];
         with_slice(&grad.contiguous()?, |grad: &[T]| {
-            let (grad_source, grad_target) = grad.split_at(source.k * self.q);
-            for (basis, grad, out) in [(source, grad_source, out_source), (target, grad_target, out_target)] {
-                par_matmul(out, basis.view(), MatrixView::new(grad, basis.k, self.q));
-            }
+            par_matmul(&mut out, self.basis.view(), MatrixView::new(grad, self.basis.k, self.q));
             Ok(())
         })?;
         Ok(Some(Tensor::from_vec(out, descriptors.shape(), descriptors.device())?))
@@ -103,23 +90,17 @@ mod tests {
 
     #[test]
     fn projection_equals_its_definition_and_its_gradient_the_central_differences() {
-        let (points, k, q) = ([7, 6], [3, 2], 4);
+        let (points, k, q) = (7, 3, 4);
         let values = |seed, len| random(seed, len).iter().map(|&value| value as f32).collect::<Vec<_>>();
-        let basis = [values(1, points[0] * k[0]), values(2, points[1] * k[1])];
-        let mass = [values(3, points[0]), values(4, points[1])];
-        let weighted = || [0, 1].map(|shape| WeightedBasis::<f64>::new(&basis[shape], &mass[shape]));
-        let rows = random(5, (points[0] + points[1]) * q);
-        let descriptors = Tensor::from_slice(&rows, (points[0] + points[1], q), &Device::Cpu).unwrap();
-
-        let mut expected = Vec::new();
-        for (shape, first) in [(0, 0), (1, points[0])] {
-            let entry = |l: usize, c: usize| {
-                let weight = |i: usize| f64::from(basis[shape][i * k[shape] + l] * mass[shape][i]);
-                (0..points[shape]).map(|i| weight(i) * rows[(first + i) * q + c]).sum::<f64>()
-            };
-            expected
-                .extend((0..k[shape]).flat_map(|l| (0..q).map(move |c| (l, c))).map(|(l, c)| entry(l, c)));
-        }
+        let (basis, mass) = (values(1, points * k), values(3, points));
+        let weighted = || WeightedBasis::<f64>::new(&basis, &mass);
+        let rows = random(5, points * q);
+        let descriptors = Tensor::from_slice(&rows, (points, q), &Device::Cpu).unwrap();
+        let entry = |l: usize, c: usize| {
+            let weight = |i: usize| f64::from(basis[i * k + l] * mass[i]);
+            (0..points).map(|i| weight(i) * rows[i * q + c]).sum::<f64>()
+        };
+        let expected: Vec<f64> = (0..k * q).map(|at| entry(at / q, at % q)).collect();
         for projected in [project(&descriptors, weighted()), composed(&descriptors, weighted())] {
             let projected: Vec<f64> = projected.unwrap().flatten_all().unwrap().to_vec1().unwrap();
             assert!(projected.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-13));

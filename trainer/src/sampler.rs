@@ -1,16 +1,20 @@
 //! Minibatches: which pair, which points.
 //!
-//! A minibatch is one index set of points of a pair, the same for both shapes, so that row `i` of the source corresponds with
-//! row `i` of the target; where the source is a part, the target has further rows. Minibatch `b` of a run depends on the seed and on `b` alone, so a resumed run draws what the
-//! uninterrupted one would have.
+//! The residual network sees points one by one, so a minibatch is one index set of points of a pair, the same for both shapes.
+//! A network that sees the surface gets whole meshes, and points are drawn from its output. Either way point `i` of the source
+//! corresponds with point `i` of the target; where the source is a part, the target has further points. Minibatch `b` of a run
+//! depends on the seed and on `b` alone, so a resumed run draws what the uninterrupted one would have.
 
-use crate::config::{LossKind, Sampling, TrainConfig};
+use crate::config::{Sampling, TrainConfig};
 use crate::dataset::MISSING;
-use crate::precompute::PreparedShape;
-use crate::step::{PairBatch, ShapeBatch};
+use crate::network::{DiffusionOptions, NetworkInput};
+use crate::precompute::{PrepareError, PreparedShape, ShapeArrays};
+use crate::step::{AssignmentPoints, PairBatch, ShapeBatch};
 use fmnet::Matrix;
-use fmnet::mesh::nearest_k_vertices;
-use rand::{Rng, SeedableRng, seq::IndexedRandom};
+use fmnet::diffusion_net::Operators;
+use fmnet::fmap::{FmapError, pseudo_inverse};
+use rand::seq::{IndexedRandom, index};
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
@@ -19,8 +23,6 @@ pub struct Sampler<'a> {
     shapes: &'a [PreparedShape],
     /// Source and target of every pair that corresponds, both directions.
     pairs: Vec<(usize, usize)>,
-    /// For each shape, the vertices among which each point is jittered, `[points, jitter]`.
-    jitter: Vec<Vec<u32>>,
     config: &'a TrainConfig,
 }
 
@@ -53,34 +55,48 @@ pub enum SamplerError {
         /// Points drawn.
         drawn: usize,
     },
+    /// The arrays of a shape cannot be read.
+    #[error(transparent)]
+    Arrays(#[from] PrepareError),
+    /// The functional map of the ground truth cannot be computed.
+    #[error("{pair}: {source}")]
+    GroundTruth {
+        /// The shapes' names.
+        pair: String,
+        /// Why.
+        source: FmapError,
+    },
 }
 
 /// Fewer common points than this, or than the eigenfunctions that they must tell apart, do not make a pair.
 const MIN_COMMON_POINTS: usize = 50;
 /// A minibatch needs so many, as there are no pairs of different rows of fewer.
 const MIN_DRAWN_POINTS: usize = 2;
+/// Vertices of each shape in a soft assignment of the coupling loss, at most.
+const ASSIGNED: usize = 1500;
 
 impl<'a> Sampler<'a> {
-    /// Lists the pairs and prepares the jitter.
+    /// Lists the pairs.
     ///
     /// # Errors
-    /// If no two shapes of a group share enough points of the pool, the larger of 50 and `k`.
+    /// If no two shapes of a group share enough points (of the pool, where distances between them are needed), the larger
+    /// of 50 and `k`.
     pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
+        let sampler = Self { shapes, pairs: Vec::new(), config };
+        let least = MIN_COMMON_POINTS.max(config.k);
         let mut pairs = Vec::new();
         for (source, s) in shapes.iter().enumerate() {
             for (target, t) in shapes.iter().enumerate() {
                 let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.is_part();
-                if corresponds && common_points(s, t).len() >= MIN_COMMON_POINTS.max(config.k) {
+                if corresponds && sampler.common_points(s, t).len() >= least {
                     pairs.push((source, target));
                 }
             }
         }
-        if pairs.is_empty() {
-            let points = MIN_COMMON_POINTS.max(config.k);
-            return Err(SamplerError::NoPairs { shapes: shapes.len(), points });
+        match pairs.is_empty() {
+            true => Err(SamplerError::NoPairs { shapes: shapes.len(), points: least }),
+            false => Ok(Self { pairs, ..sampler }),
         }
-        let jitter = shapes.iter().map(|shape| jitter_neighbors(shape, config.jitter)).collect();
-        Ok(Self { shapes, pairs, jitter, config })
     }
 
     /// Number of ordered pairs.
@@ -91,7 +107,8 @@ impl<'a> Sampler<'a> {
     /// Minibatch number `index` of the run, from 0: one pair or several.
     ///
     /// # Errors
-    /// If fewer than 2 of the points drawn on a whole are on its part.
+    /// If fewer than 2 of the points drawn on a whole are on its part, the arrays of a shape cannot be read, or the ground
+    /// truth does not make a functional map.
     pub fn batch(&self, index: u64) -> Result<Vec<PairBatch>, SamplerError> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed);
         rng.set_stream(index + 1);
@@ -100,38 +117,62 @@ impl<'a> Sampler<'a> {
 
     fn pair(&self, rng: &mut ChaCha8Rng) -> Result<PairBatch, SamplerError> {
         let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
-        let (common, all) = self.draw(&self.shapes[source], &self.shapes[target], rng);
+        let (source, target) = (&self.shapes[source], &self.shapes[target]);
+        let target_arrays = target.arrays()?;
+        let (common, all) = self.draw(source, target, &target_arrays.mass, rng);
         if common.len() < MIN_DRAWN_POINTS {
-            let name = |shape: usize| self.shapes[shape].entry.name.clone();
-            let (source_name, target_name) = (name(source), name(target));
+            let (source_name, target_name) = (source.entry.name.clone(), target.entry.name.clone());
             let (common, drawn) = (common.len(), all.len());
             return Err(SamplerError::TooFewCommon { source_name, target_name, common, drawn });
         }
-        let negatives =
-            if self.config.loss == LossKind::Siamese { negatives(common.len(), rng) } else { Vec::new() };
-        Ok(PairBatch {
-            source: self.sample(source, &common, rng),
-            target: self.sample(target, &all, rng),
-            source_is_part: self.shapes[source].entry.is_part(),
-            negatives,
-        })
+        let source_arrays = source.arrays()?;
+        let loss = &self.config.loss;
+        let negatives = if loss.siamese > 0.0 { negatives(common.len(), rng) } else { Vec::new() };
+        let ground_truth = match loss.spectral > 0.0 {
+            true => Some(self.ground_truth([(source, &source_arrays), (target, &target_arrays)])?),
+            false => None,
+        };
+        let source_is_part = source.entry.is_part();
+        let source = self.shape_batch(source, source_arrays, &common, rng);
+        let target = self.shape_batch(target, target_arrays, &all, rng);
+        let assignment = match loss.coupling > 0.0 {
+            true => Some([assignment(&source, &target, rng)?, assignment(&target, &source, rng)?]),
+            false => None,
+        };
+        Ok(PairBatch { source, target, source_is_part, negatives, ground_truth, assignment })
     }
 
-    /// Draws points of the target's pool without replacement: those that the source has too, ascending, and all, the same ones
+    /// Points that both shapes have, ascending; of their pools, where distances between them are needed or points are all
+    /// that the network sees.
+    fn common_points(&self, source: &PreparedShape, target: &PreparedShape) -> Vec<u32> {
+        if self.of_pool() {
+            let in_target = |point: &&u32| target.pool.points.binary_search(point).is_ok();
+            return source.pool.points.iter().filter(in_target).copied().collect();
+        }
+        let both = source.points.iter().zip(&target.points).enumerate();
+        both.filter(|(_, (s, t))| **s != MISSING && **t != MISSING).map(|(point, _)| point as u32).collect()
+    }
+
+    fn of_pool(&self) -> bool {
+        self.config.diffusion().is_none() || self.config.loss.soft_error > 0.0
+    }
+
+    /// Draws points of the target without replacement: those that the source has too, ascending, and all, the same ones
     /// first. Only a part lacks some: its whole is sampled everywhere, or its descriptors would be compared with those of
     /// a part.
     fn draw(
         &self,
         source: &PreparedShape,
         target: &PreparedShape,
+        mass: &[f32],
         rng: &mut ChaCha8Rng,
     ) -> (Vec<u32>, Vec<u32>) {
-        let common = match source.entry.is_part() {
+        let common = match source.entry.is_part() && self.of_pool() {
             true => target.pool.points.clone(),
-            false => common_points(source, target),
+            false => self.common_points(source, target),
         };
         let count = self.config.points.min(common.len());
-        let area = |&point: &u32| target.shape.basis.mass[target.points[point as usize] as usize];
+        let area = |&point: &u32| mass[target.points[point as usize] as usize];
         let mut points: Vec<u32> = match self.config.sampling {
             Sampling::Uniform => common.choose_multiple(rng, count).copied().collect(),
             Sampling::Area => common
@@ -141,39 +182,131 @@ impl<'a> Sampler<'a> {
                 .collect(),
         };
         points.sort_unstable();
-        let in_source = |point: &u32| source.pool.points.binary_search(point).is_ok();
+        let in_source = |point: &u32| {
+            source.points[*point as usize] != MISSING
+                && (!self.of_pool() || source.pool.points.binary_search(point).is_ok())
+        };
         let (common, others): (Vec<u32>, Vec<u32>) = points.into_iter().partition(in_source);
         let all = [&common[..], &others].concat();
         (common, all)
     }
 
-    fn sample(&self, shape: usize, points: &[u32], rng: &mut ChaCha8Rng) -> ShapeBatch {
-        let prepared = &self.shapes[shape];
+    fn shape_batch(
+        &self,
+        prepared: &PreparedShape,
+        arrays: ShapeArrays,
+        points: &[u32],
+        rng: &mut ChaCha8Rng,
+    ) -> ShapeBatch {
         let jitter = self.config.jitter.max(1);
         let vertices: Vec<u32> = points
             .iter()
             .map(|&point| match jitter {
                 1 => prepared.points[point as usize],
-                _ => self.jitter[shape][point as usize * jitter + rng.random_range(0..jitter)],
+                _ => prepared.jitter[point as usize * jitter + rng.random_range(0..jitter)],
             })
             .collect();
-        let basis = &prepared.shape.basis;
         let k = self.config.k;
-        let rows = |i: usize, j: usize| basis.eigenvectors[(vertices[i] as usize, j)] as f32;
-        ShapeBatch {
-            shot: prepared.shape.shot.select_rows(&vertices),
-            basis: Matrix::from_fn(vertices.len(), k, rows),
-            mass: vertices.iter().map(|&v| basis.mass[v as usize] as f32).collect(),
-            eigenvalues: basis.eigenvalues[..k].to_vec(),
-            distances: prepared.pool.distances(points),
+        let eigenvalues = arrays.eigenvalues[..k].to_vec();
+        let distances =
+            if self.config.loss.soft_error > 0.0 { prepared.pool.distances(points) } else { None };
+        match self.config.diffusion() {
+            Some(options) => ShapeBatch {
+                basis: arrays.eigenvectors.first_cols(k),
+                mass: arrays.mass.clone(),
+                input: diffusion_input(options, arrays),
+                eigenvalues,
+                points: vertices,
+                distances,
+            },
+            None => ShapeBatch {
+                input: NetworkInput {
+                    features: arrays.shot.select_rows(&vertices),
+                    operators: Operators::default(),
+                },
+                basis: arrays.eigenvectors.first_cols(k).select_rows(&vertices),
+                mass: vertices.iter().map(|&v| arrays.mass[v as usize]).collect(),
+                eigenvalues,
+                points: (0..vertices.len() as u32).collect(),
+                distances,
+            },
         }
+    }
+
+    /// The least-squares functional maps of all points that both shapes have, source to target and back.
+    fn ground_truth(&self, shapes: [(&PreparedShape, &ShapeArrays); 2]) -> Result<[Matrix; 2], SamplerError> {
+        let [(source, _), (target, _)] = shapes;
+        let points = self.common_points(source, target);
+        let functions = shapes.map(|(prepared, arrays)| {
+            let row = |i: usize, j: usize| {
+                f64::from(arrays.eigenvectors[(prepared.points[points[i] as usize] as usize, j)])
+            };
+            Matrix::from_fn(points.len(), self.config.k, row)
+        });
+        let wrong = |error| SamplerError::GroundTruth {
+            pair: format!("{} -> {}", source.entry.name, target.entry.name),
+            source: error,
+        };
+        let [phi, psi] = &functions;
+        Ok([
+            fmnet::fmap::from_points(phi, psi).map_err(wrong)?,
+            fmnet::fmap::from_points(psi, phi).map_err(wrong)?,
+        ])
     }
 }
 
-/// Points that are in the pools of both shapes, ascending.
-fn common_points(source: &PreparedShape, target: &PreparedShape) -> Vec<u32> {
-    let in_target = |point: &&u32| target.pool.points.binary_search(point).is_ok();
-    source.pool.points.iter().filter(in_target).copied().collect()
+/// What a DiffusionNet is given of a shape: the wave kernel signature beside the scaled SHOT descriptors, and the operators.
+pub fn diffusion_input(options: &DiffusionOptions, arrays: ShapeArrays) -> NetworkInput {
+    let n = arrays.n();
+    let mut features = Matrix::zeros(n, options.inputs());
+    let energies = options.wks_energies;
+    if energies > 0 {
+        let k = options.wks_eigenfunctions;
+        let signature =
+            fmnet::spectral::wks_of(&arrays.eigenvalues[..k], &arrays.eigenvectors.first_cols(k), energies);
+        (0..n).for_each(|v| features.row_mut(v)[..energies].copy_from_slice(signature.row(v)));
+    }
+    if options.takes_shot() {
+        let scale = options.shot_scale as f32;
+        for v in 0..n {
+            let row = features.row_mut(v)[energies..].iter_mut();
+            row.zip(arrays.shot.row(v)).for_each(|(to, shot)| *to = scale * shot);
+        }
+    }
+    let k = options.eigenfunctions;
+    let operators = Operators {
+        eigenvalues: arrays.eigenvalues[..k].iter().map(|&x| x as f32).collect(),
+        eigenvectors: arrays.eigenvectors.first_cols(k).into_data(),
+        gradients_x: arrays.gradients_x.into_data(),
+        gradients_y: arrays.gradients_y.into_data(),
+        mass: arrays.mass,
+    };
+    NetworkInput { features, operators }
+}
+
+/// Random vertices of both shapes for the soft assignment of a map from one to the other.
+fn assignment(
+    from: &ShapeBatch,
+    to: &ShapeBatch,
+    rng: &mut ChaCha8Rng,
+) -> Result<AssignmentPoints, SamplerError> {
+    let mut rows = |shape: &ShapeBatch| -> Vec<u32> {
+        let n = shape.mass.len();
+        let mut rows: Vec<u32> =
+            index::sample(rng, n, n.min(ASSIGNED)).into_iter().map(|i| i as u32).collect();
+        rows.sort_unstable();
+        rows
+    };
+    let (rows_from, rows_to) = (rows(from), rows(to));
+    let basis_to = to.basis.select_rows(&rows_to).map(f64::from);
+    let wrong = |source| SamplerError::GroundTruth { pair: "a soft assignment".into(), source };
+    let inverse_to = pseudo_inverse(&basis_to).map_err(wrong)?.map(|x| x as f32);
+    Ok(AssignmentPoints {
+        basis_from: from.basis.select_rows(&rows_from),
+        from: rows_from,
+        to: rows_to,
+        inverse_to,
+    })
 }
 
 /// As many pairs of different rows as there are rows, of which there must be 2 at least.
@@ -182,23 +315,15 @@ fn negatives(rows: usize, rng: &mut ChaCha8Rng) -> Vec<(u32, u32)> {
     (0..rows).map(|row| (row as u32, other(row, rng) as u32)).collect()
 }
 
-/// For each point the vertices nearest to its own, `[points, jitter]`; empty where there is no jitter.
-fn jitter_neighbors(shape: &PreparedShape, jitter: usize) -> Vec<u32> {
-    if jitter <= 1 {
-        return Vec::new();
-    }
-    let vertices = shape.shape.mesh().vertices();
-    let positions: Vec<[f64; 3]> =
-        shape.points.iter().map(|&v| vertices[if v == MISSING { 0 } else { v as usize }]).collect();
-    nearest_k_vertices(vertices, &positions, jitter)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::dataset::{Correspondence, ShapeEntry, Split};
-    use crate::precompute::{PrepareOptions, prepare};
+    use crate::losses::LossOptions;
+    use crate::precompute::prepare;
+    use crate::train::prepare_options;
     use fmnet::Mesh;
+    use fmnet::cache::Cache;
     use fmnet::io::{Attributes, write_mesh};
     use fmnet::mesh::shapes::bumpy_sphere;
 
@@ -207,7 +332,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let whole = bumpy_sphere(3, 1);
         let part = Mesh::new(whole.vertices().to_vec(), whole.faces()[..400].to_vec()).unwrap();
-        let config = TrainConfig { k: 5, pool: 1000, loss: LossKind::Siamese, ..TrainConfig::default() };
+        let loss = LossOptions::siamese();
+        let config = TrainConfig { k: 5, pool: 1000, loss, ..TrainConfig::paper() };
+        let cache = Cache::open(&folder.path().join("cache")).unwrap();
         let shape = |(name, mesh, is_part): (&str, &Mesh, bool)| {
             let path = folder.path().join(format!("{name}.off"));
             write_mesh(&path, mesh, &Attributes::default()).unwrap();
@@ -219,16 +346,15 @@ mod tests {
                 split: Split::Train,
                 whole: is_part.then(|| folder.path().join("whole.off")),
             };
-            let options = PrepareOptions { shape: config.shape_options(), pool: config.pool, seed: 1 };
-            prepare(&entry, &options, None, &fmnet::events::ignore).unwrap()
+            prepare(&entry, &prepare_options(&config), 1, &cache, &fmnet::events::ignore).unwrap()
         };
         let shapes = [("whole", &whole, false), ("part", &part, true)].map(shape);
         let batch = |points: usize| {
             Sampler::new(&shapes, &TrainConfig { points, ..config.clone() }).unwrap().batch(0)
         };
         let pair = &batch(1000).unwrap()[0];
-        let rows = pair.source.shot.rows();
-        assert!(rows > 50 && rows < pair.target.shot.rows() && pair.negatives.len() == rows);
+        let rows = pair.source.points.len();
+        assert!(rows > 50 && rows < pair.target.points.len() && pair.negatives.len() == rows);
         let error = batch(1).unwrap_err().to_string();
         assert!(error.starts_with("part -> whole: ") && error.contains(" of 1 points drawn"), "{error}");
     }

@@ -7,7 +7,7 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
 use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split};
 use crate::events::{TrainEvent, TrainObserver};
-use crate::network::Network;
+use crate::network::NetworkOptions;
 use crate::plot::History;
 use crate::precompute::{PrepareError, PrepareOptions, PreparedShape, prepare};
 use crate::sampler::{Sampler, SamplerError};
@@ -124,16 +124,13 @@ pub fn train(
     let text = config.to_toml();
     write_atomically(&config.out.join("config.toml"), |out| out.write_all(text.as_bytes()))?;
     let shapes = prepare_splits(config, &config.splits.0, observer)?;
-    let held_out = match config.validate_every {
-        0 => Vec::new(),
-        _ => prepare_entries(config, &validation_entries(config)?, observer)?,
-    };
-    let validation = Validation::new(&held_out, config.validation_pairs, config.seed);
+    let held_out = if config.validate_every > 0 { validation_entries(config)? } else { Vec::new() };
+    let validation = Validation::new(&held_out, config, observer)?;
     let sampler = Sampler::new(&shapes, config)?;
     let (step, best_error) = resumed.as_ref().map_or((0, f64::INFINITY), |c| (c.step, c.best_error));
     let runner = match resumed {
         Some(checkpoint) => checkpoint.into_runner(device)?,
-        None => StepRunner::new(Network::new(config.network_options(), device)?, config.step_options())
+        None => StepRunner::new(config.network.build(config.seed, device)?, config.step_options())
             .map_err(|source| TrainError::Step { step: 0, source, checkpoint: "none".into() })?,
     };
     let metrics = open_metrics(&config.out.join(METRICS), step)?;
@@ -190,7 +187,7 @@ fn prepare_entries(
     observer: TrainObserver,
 ) -> Result<Vec<PreparedShape>, TrainError> {
     let cache = Cache::open(&config.cache_folder())?;
-    let options = PrepareOptions { shape: config.shape_options(), pool: config.pool, seed: config.seed };
+    let options = prepare_options(config);
     let done = AtomicUsize::new(0);
     let prepared: Result<Vec<PreparedShape>, PrepareError> = entries
         .par_iter()
@@ -200,13 +197,24 @@ fn prepare_entries(
                     observer(TrainEvent::Warning { text });
                 }
             };
-            let shape = prepare(entry, &options, Some(&cache), &warn)?;
+            let shape = prepare(entry, &options, config.jitter, &cache, &warn)?;
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             observer(TrainEvent::Prepared { done, total: entries.len(), shape: entry.name.clone() });
             Ok(shape)
         })
         .collect();
     Ok(prepared?)
+}
+
+/// What is prepared of each shape for a run.
+pub fn prepare_options(config: &TrainConfig) -> PrepareOptions {
+    let (gradients, shot) = match &config.network {
+        NetworkOptions::Residual(_) => (0, true),
+        NetworkOptions::Diffusion(options) => (options.eigenfunctions, options.takes_shot()),
+    };
+    let distances = config.loss.soft_error > 0.0;
+    let (shape, pool, seed) = (config.shape_options(), config.pool, config.seed);
+    PrepareOptions { shape, gradients, shot, distances, pool, seed }
 }
 
 /// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may
@@ -319,9 +327,8 @@ impl Run<'_> {
     }
 
     fn validate(&mut self, validation: &Validation) -> Result<(), TrainError> {
-        let result = validation
-            .run(&self.runner.network, self.config.k, self.config.runtime_solver().for_matching())
-            .map_err(TrainError::Validation)?;
+        let result =
+            validation.run(self.runner.network.as_ref(), self.config).map_err(TrainError::Validation)?;
         let best = result.mean_error < self.best_error;
         if best {
             self.best_error = result.mean_error;

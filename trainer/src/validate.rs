@@ -1,23 +1,38 @@
 //! The network tried on held-out pairs, through the runtime's own functional map and point map, without refinement.
 
-use crate::dataset::MISSING;
-use crate::network::Network;
-use crate::precompute::PreparedShape;
-use candle_core::{Device, Tensor};
+use crate::config::TrainConfig;
+use crate::dataset::{MISSING, ShapeEntry};
+use crate::events::{TrainEvent, TrainObserver};
+use crate::network::{Network, NetworkInput, NetworkOptions};
+use crate::precompute::{ProcessedShape, ShapeArrays, process};
+use crate::sampler::diffusion_input;
+use crate::train::{TrainError, prepare_options};
+use candle_core::Device;
 use fmnet::Matrix;
+use fmnet::cache::Cache;
+use fmnet::diffusion_net::Operators;
+use fmnet::events::Event;
 use fmnet::fmap::{FmapSolver, functional_map};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::point_map::{Comparison, recover_by};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Points of a pair whose error is measured, at most.
 const POINTS: usize = 1000;
 
+/// A held-out shape.
+struct HeldOut {
+    processed: ProcessedShape,
+    input: NetworkInput,
+    /// Geodesic distances, of targets.
+    solver: Option<GeodesicSolver>,
+}
+
 /// Held-out pairs with what their evaluation needs.
-pub struct Validation<'a> {
-    shapes: &'a [PreparedShape],
-    solvers: Vec<Option<GeodesicSolver>>,
+pub struct Validation {
+    shapes: Vec<HeldOut>,
     pairs: Vec<(usize, usize)>,
 }
 
@@ -32,23 +47,40 @@ pub struct ValidationResult {
     pub within_5: f64,
 }
 
-impl<'a> Validation<'a> {
-    /// Draws at most `count` pairs of corresponding shapes. A part is a source only, so its group needs a whole among the
-    /// shapes.
-    pub fn new(shapes: &'a [PreparedShape], count: usize, seed: u64) -> Self {
-        let all = (0..shapes.len()).flat_map(|s| (0..shapes.len()).map(move |t| (s, t)));
-        let fits = |&(s, t): &(usize, usize)| {
-            s != t && shapes[s].entry.group == shapes[t].entry.group && !shapes[t].entry.is_part()
+impl Validation {
+    /// Draws at most `config.validation_pairs` pairs of corresponding shapes, as many of each group as can be, and processes
+    /// their shapes. A part is a source only, so its group needs a whole among the shapes.
+    ///
+    /// # Errors
+    /// If a shape cannot be read or processed, or the cache cannot be written.
+    pub fn new(
+        entries: &[ShapeEntry],
+        config: &TrainConfig,
+        observer: TrainObserver,
+    ) -> Result<Self, TrainError> {
+        let drawn = draw_pairs(entries, config.validation_pairs, config.seed);
+        let used: BTreeSet<usize> = drawn.iter().flat_map(|&(s, t)| [s, t]).collect();
+        let position: BTreeMap<usize, usize> =
+            used.iter().enumerate().map(|(i, &entry)| (entry, i)).collect();
+        let cache = Cache::open(&config.cache_folder())?;
+        let options = prepare_options(config);
+        let warn = |event| {
+            if let Event::Warning(text) = event {
+                observer(TrainEvent::Warning { text });
+            }
         };
-        let mut pairs: Vec<(usize, usize)> = all.filter(fits).collect();
-        pairs.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
-        pairs.truncate(count);
-        let is_target = |shape: usize| pairs.iter().any(|&(_, t)| t == shape);
-        let solver = |i: usize| {
-            is_target(i).then(|| GeodesicSolver::new(shapes[i].shape.mesh(), &GeodesicOptions::default()))
-        };
-        let solvers = (0..shapes.len()).map(solver).collect();
-        Self { shapes, solvers, pairs }
+        let mut shapes = Vec::with_capacity(used.len());
+        for &entry in &used {
+            let processed = process(&entries[entry], &options.shape, Some(&cache), &warn)?;
+            let arrays = ShapeArrays::of(&processed.shape, &options);
+            let input = network_input(&config.network, arrays);
+            let is_target = drawn.iter().any(|&(_, t)| t == entry);
+            let solver =
+                is_target.then(|| GeodesicSolver::new(processed.shape.mesh(), &GeodesicOptions::default()));
+            shapes.push(HeldOut { processed, input, solver });
+        }
+        let pairs = drawn.iter().map(|(s, t)| (position[s], position[t])).collect();
+        Ok(Self { shapes, pairs })
     }
 
     /// Whether there are no pairs.
@@ -56,18 +88,15 @@ impl<'a> Validation<'a> {
         self.pairs.is_empty()
     }
 
-    /// Matches every pair with `k` eigenfunctions and `solver`, parts with [`FmapSolver::Part`]. NaN where there are no
-    /// pairs.
+    /// Matches every pair as the runtime would with a model of this run, parts with [`FmapSolver::Part`]. NaN where there are
+    /// no pairs.
     ///
     /// # Errors
     /// If the network, a functional map or a point map fails.
-    ///
-    /// # Panics
-    /// If a shape was prepared with fewer than `k` eigenfunctions.
-    pub fn run(&self, network: &Network, k: usize, solver: FmapSolver) -> anyhow::Result<ValidationResult> {
+    pub fn run(&self, network: &dyn Network, config: &TrainConfig) -> anyhow::Result<ValidationResult> {
         let mut errors = Vec::new();
         for &(source, target) in &self.pairs {
-            errors.extend(self.pair_errors(source, target, network, k, solver)?);
+            errors.extend(self.pair_errors(source, target, network, config)?);
         }
         let share = |limit: f32| errors.iter().filter(|&&e| e <= limit).count() as f64 / errors.len() as f64;
         let mean = errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64;
@@ -78,14 +107,16 @@ impl<'a> Validation<'a> {
         &self,
         source: usize,
         target: usize,
-        network: &Network,
-        k: usize,
-        solver: FmapSolver,
+        network: &dyn Network,
+        config: &TrainConfig,
     ) -> anyhow::Result<Vec<f32>> {
-        let (s, t) = (&self.shapes[source], &self.shapes[target]);
-        let (basis_source, basis_target) = (s.shape.basis.truncated(k), t.shape.basis.truncated(k));
-        let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
-        let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
+        let (source, target) = (&self.shapes[source], &self.shapes[target]);
+        let (s, t) = (&source.processed, &target.processed);
+        let (basis_source, basis_target) =
+            (s.shape.basis.truncated(config.k), t.shape.basis.truncated(config.k));
+        let f = basis_source.project(&descriptors(network, &source.input)?);
+        let g = basis_target.project(&descriptors(network, &target.input)?);
+        let solver = config.runtime_solver().for_matching();
         let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
         let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
         let map = recover_by(Comparison::suiting(solver), &map, &basis_source, &basis_target)?;
@@ -96,7 +127,7 @@ impl<'a> Validation<'a> {
         let stride = common.len().div_ceil(POINTS).max(1);
         let queries: Vec<(u32, u32)> =
             common.iter().step_by(stride).filter_map(|&(a, b)| Some((b, map.get(a as usize)?))).collect();
-        let solver = self.solvers[target].as_ref().expect("every target has a solver");
+        let solver = target.solver.as_ref().expect("every target has a solver");
         let unit = t.shape.mesh().scale() as f32;
         // A match on another component is as far away as can be.
         let farthest = t.shape.mesh().diagonal() as f32;
@@ -104,10 +135,35 @@ impl<'a> Validation<'a> {
     }
 }
 
-/// Descriptors `[n, 352]` of a shape's SHOT descriptors `[n, 352]`; fails where the network does.
-pub fn descriptors(network: &Network, shot: &Matrix<f32>) -> candle_core::Result<Matrix<f32>> {
-    let device = network.variable().device();
-    let input = Tensor::from_slice(shot.data(), (shot.rows(), shot.cols()), device)?;
-    let output = network.forward(&[input])?.to_device(&Device::Cpu)?;
-    Ok(Matrix::from_vec(shot.rows(), shot.cols(), output.flatten_all()?.to_vec1()?))
+/// Pairs of corresponding shapes, group by group in turn, each in random order.
+fn draw_pairs(entries: &[ShapeEntry], count: usize, seed: u64) -> Vec<(usize, usize)> {
+    let mut groups: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
+    for (s, source) in entries.iter().enumerate() {
+        for (t, target) in entries.iter().enumerate() {
+            if s != t && source.group == target.group && !target.is_part() {
+                groups.entry(&source.group).or_default().push((s, t));
+            }
+        }
+    }
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    groups.values_mut().for_each(|pairs| pairs.shuffle(&mut rng));
+    let longest = groups.values().map(Vec::len).max().unwrap_or(0);
+    let turn = |i: usize| groups.values().filter_map(move |pairs| pairs.get(i).copied());
+    (0..longest).flat_map(turn).take(count).collect()
+}
+
+/// What a network is given of a whole shape.
+pub fn network_input(network: &NetworkOptions, arrays: ShapeArrays) -> NetworkInput {
+    match network {
+        NetworkOptions::Residual(_) => {
+            NetworkInput { features: arrays.shot, operators: Operators::default() }
+        }
+        NetworkOptions::Diffusion(options) => diffusion_input(options, arrays),
+    }
+}
+
+/// Descriptors `[n, d]` of a shape; fails where the network does.
+pub fn descriptors(network: &dyn Network, input: &NetworkInput) -> candle_core::Result<Matrix<f32>> {
+    let output = network.forward(&[input])?[0].to_device(&Device::Cpu)?;
+    Ok(Matrix::from_vec(input.features.rows(), network.n_outputs(), output.flatten_all()?.to_vec1()?))
 }

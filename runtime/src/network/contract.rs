@@ -1,30 +1,30 @@
-//! The contract of a model file: its graph's input and output, and what travels in `metadata_props`.
+//! The contract of a model file: its graph's inputs and output, and what travels in `metadata_props`.
 //!
-//! Graph: input `shot`, float32 `[n, 352]`; output `descriptors`, float32 `[n, 352]`; `n` dynamic; standard operators only.
-//! Metadata: the keys of [`ModelMetadata::to_pairs`], all under the prefix `fmnet.`.
+//! Graph: the inputs are quantities of a shape by name ([`Quantity`]), float32, at unit area; the output is `descriptors`,
+//! float32 `[n, d]`; the number of vertices `n` is dynamic; standard operators only. Format 1 has the input `shot` alone and
+//! d = 352. Metadata: the keys of [`ModelMetadata::to_pairs`], all under the prefix `fmnet.`.
 
 use super::NetworkError;
 use super::proto::{Model, Type, ValueInfo};
 use crate::descriptor::ShotOptions;
 use crate::fmap::FmapSolver;
-use crate::shape::ShapeOptions;
 use prost::Message;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
 
-/// Width of input and output.
-pub const WIDTH: usize = 352;
-/// Name of the graph's input.
-pub const INPUT: &str = "shot";
+/// Width of SHOT.
+pub const SHOT_WIDTH: usize = 352;
 /// Name of the graph's output.
 pub const OUTPUT: &str = "descriptors";
 /// The newest format that this version reads.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
-/// Most eigenfunctions of a functional map.
-const MAX_K: usize = 500;
+/// Most eigenfunctions, of a functional map or as an input.
+pub const MAX_K: usize = 500;
+/// Most descriptors.
+const MAX_OUTPUTS: usize = 4096;
 /// Least number of vertices that meshes are decimated to.
 const MIN_DECIMATE: usize = 100;
 
@@ -33,12 +33,111 @@ const PREFIX: &str = "fmnet.";
 const EXPORT: &str = "export the model with `fmnet-train export`";
 const ONNX_FLOAT: i32 = 1;
 
+/// What a network can be given of a shape, at unit area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// SHOT descriptors, `[n, 352]`.
+    Shot,
+    /// Vertex areas, `[n]`.
+    Mass,
+    /// Eigenvalues of the Laplacian, `[k]`.
+    Eigenvalues,
+    /// Its eigenvectors, `[n, k]`.
+    Eigenvectors,
+    /// Gradients of the eigenvectors along the first axis of a tangent frame at each vertex, `[n, k]`
+    /// ([`crate::spectral::EigenGradients`]).
+    GradientsX,
+    /// Along the second axis, `[n, k]`.
+    GradientsY,
+}
+
+impl Quantity {
+    /// Every quantity.
+    pub const ALL: [Self; 6] =
+        [Self::Shot, Self::Mass, Self::Eigenvalues, Self::Eigenvectors, Self::GradientsX, Self::GradientsY];
+
+    /// The name of the input, and of the file that `features` writes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shot => "shot",
+            Self::Mass => "mass",
+            Self::Eigenvalues => "eigenvalues",
+            Self::Eigenvectors => "eigenvectors",
+            Self::GradientsX => "gradients_x",
+            Self::GradientsY => "gradients_y",
+        }
+    }
+
+    /// The shape for a `width`, `None` standing for the number of vertices.
+    pub fn dims(self, width: usize) -> Vec<Option<usize>> {
+        match self {
+            Self::Mass => vec![None],
+            Self::Eigenvalues => vec![Some(width)],
+            Self::Shot | Self::Eigenvectors | Self::GradientsX | Self::GradientsY => vec![None, Some(width)],
+        }
+    }
+
+    /// The width that an input of these dimensions asks for, or what should be there.
+    fn width(self, dims: &[Option<i64>]) -> Result<usize, String> {
+        let dynamic = |dim: &Option<i64>| matches!(dim, None | Some(0));
+        let width = match (self, dims) {
+            (Self::Mass, [n]) if dynamic(n) => Some(0),
+            (Self::Eigenvalues, [Some(k)]) => usize::try_from(*k).ok(),
+            (Self::Mass | Self::Eigenvalues, _) => None,
+            (_, [n, Some(width)]) if dynamic(n) => usize::try_from(*width).ok(),
+            _ => None,
+        };
+        let (expected, fits) = match self {
+            Self::Shot => ("[n, 352] with n dynamic", width == Some(SHOT_WIDTH)),
+            Self::Mass => ("[n], dynamic", width.is_some()),
+            Self::Eigenvalues => ("[k], 1 to 500", width.is_some_and(|k| (1..=MAX_K).contains(&k))),
+            _ => {
+                ("[n, k] with n dynamic and k from 1 to 500", width.is_some_and(|k| (1..=MAX_K).contains(&k)))
+            }
+        };
+        width.filter(|_| fits).ok_or_else(|| format!("expected the shape {expected}, found {dims:?}"))
+    }
+}
+
+/// An input of a model's graph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModelInput {
+    /// Which quantity.
+    pub quantity: Quantity,
+    /// Its width, 0 for [`Quantity::Mass`]: 352 for SHOT, else the number of eigenpairs.
+    pub width: usize,
+}
+
+/// What a model file takes and gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contract {
+    /// The inputs, in the graph's order; at least one has a row for each vertex.
+    pub inputs: Vec<ModelInput>,
+    /// Width `d` of the descriptors.
+    pub outputs: usize,
+    /// What travels with it.
+    pub metadata: ModelMetadata,
+}
+
+impl Contract {
+    /// Eigenpairs that the inputs need, 0 where they need none.
+    pub fn eigenpairs(&self) -> usize {
+        let spectral = |input: &&ModelInput| input.quantity != Quantity::Shot;
+        self.inputs.iter().filter(spectral).map(|input| input.width).max().unwrap_or(0)
+    }
+
+    /// Whether an input is the quantity.
+    pub fn takes(&self, quantity: Quantity) -> bool {
+        self.inputs.iter().any(|input| input.quantity == quantity)
+    }
+}
+
 /// What the runtime must know of a model, and what people want to know of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelMetadata {
     /// Format of the file, at most [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// The SHOT descriptor that the network was trained on: a radius below 1, 10 bins.
+    /// The SHOT descriptor that the network was trained on, if it takes one: a radius below 1, 10 bins.
     pub shot: ShotOptions,
     /// Number of eigenfunctions of the functional map. Range 1 to 500.
     pub k: usize,
@@ -61,11 +160,6 @@ pub struct ModelMetadata {
 }
 
 impl ModelMetadata {
-    /// The settings of [`crate::shape::Shape::process`] that fit the model.
-    pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: self.decimate, k: self.k, shot: self.shot, whole_area: None }
-    }
-
     /// As key-value pairs for `metadata_props`; without a mask its weight is 0, and a `decimate` of 0 stands for never.
     pub fn to_pairs(&self) -> Vec<(String, String)> {
         let (solver, mask_weight) = match self.solver {
@@ -143,7 +237,7 @@ impl ModelMetadata {
         if !(self.shot.radius > 0.0 && self.shot.radius < 1.0) {
             return wrong("shot_radius", &self.shot.radius, "between 0 and 1");
         }
-        if self.shot.bins.checked_add(1).and_then(|bins| bins.checked_mul(32)) != Some(WIDTH) {
+        if self.shot.bins.checked_add(1).and_then(|bins| bins.checked_mul(32)) != Some(SHOT_WIDTH) {
             return wrong("shot_bins", &self.shot.bins, "10");
         }
         if let FmapSolver::Regularized { weight }
@@ -186,11 +280,11 @@ impl Pairs<'_> {
     }
 }
 
-/// Checks a model file against the contract and reads its metadata. `path` is for messages.
+/// Checks a model file against the contract and reads what it takes, gives and carries. `path` is for messages.
 ///
 /// # Errors
-/// If it is no ONNX file, its graph has another input or output, or a key is missing or out of range.
-pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, NetworkError> {
+/// If it is no ONNX file, its graph has other inputs or another output, or a key is missing or out of range.
+pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<Contract, NetworkError> {
     let contract = |reason: String| NetworkError::Contract { path: path.to_path_buf(), reason };
     let model = Model::decode(bytes).map_err(|e| contract(format!("not an ONNX file ({e}); {EXPORT}")))?;
     let graph = model.graph.ok_or_else(|| contract(format!("no graph in it; {EXPORT}")))?;
@@ -200,31 +294,67 @@ pub fn read_contract(path: &Path, bytes: &[u8]) -> Result<ModelMetadata, Network
             opset.domain
         )));
     }
-    check_value(&graph.input, INPUT).map_err(|reason| contract(format!("input: {reason}; {EXPORT}")))?;
-    check_value(&graph.output, OUTPUT).map_err(|reason| contract(format!("output: {reason}; {EXPORT}")))?;
+    let values = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
+    let metadata = ModelMetadata::from_pairs(&Pairs { path, values })?;
+    let inputs = inputs(&graph.input).map_err(|reason| contract(format!("input: {reason}; {EXPORT}")))?;
+    if metadata.format_version == 1 && inputs != [ModelInput { quantity: Quantity::Shot, width: SHOT_WIDTH }]
+    {
+        return Err(contract(format!("a model of format 1 has the input \"shot\" alone; {EXPORT}")));
+    }
+    let outputs = output(&graph.output).map_err(|reason| contract(format!("output: {reason}; {EXPORT}")))?;
     if !graph.node.iter().any(|node| node.output.iter().any(|name| name == OUTPUT)) {
         return Err(contract(format!(
             "no operator gives {OUTPUT:?}; the file is damaged, export the model anew"
         )));
     }
-    let values = model.metadata_props.into_iter().map(|entry| (entry.key, entry.value)).collect();
-    ModelMetadata::from_pairs(&Pairs { path, values })
+    Ok(Contract { inputs, outputs, metadata })
 }
 
-fn check_value(values: &[ValueInfo], name: &str) -> Result<(), String> {
-    let [value] = values else { return Err(format!("expected one, {name:?}, found {}", values.len())) };
-    if value.name != name {
-        return Err(format!("expected {name:?}, found {:?}", value.name));
+fn inputs(values: &[ValueInfo]) -> Result<Vec<ModelInput>, String> {
+    let known = || Quantity::ALL.map(Quantity::name).join(", ");
+    let mut inputs: Vec<ModelInput> = Vec::new();
+    for value in values {
+        let Some(quantity) = Quantity::ALL.into_iter().find(|quantity| quantity.name() == value.name) else {
+            return Err(format!(
+                "{:?} is not a quantity that this version computes ({})",
+                value.name,
+                known()
+            ));
+        };
+        if inputs.iter().any(|input| input.quantity == quantity) {
+            return Err(format!("{:?} is there twice", value.name));
+        }
+        let width = float_dims(value).and_then(|dims| quantity.width(&dims));
+        let width = width.map_err(|reason| format!("{:?}: {reason}", value.name))?;
+        inputs.push(ModelInput { quantity, width });
     }
+    match inputs.iter().any(|input| input.quantity != Quantity::Eigenvalues) {
+        true => Ok(inputs),
+        false => Err(format!("expected one at least that has a row for each vertex, of {}", known())),
+    }
+}
+
+fn output(values: &[ValueInfo]) -> Result<usize, String> {
+    let [value] = values else { return Err(format!("expected one, {OUTPUT:?}, found {}", values.len())) };
+    if value.name != OUTPUT {
+        return Err(format!("expected {OUTPUT:?}, found {:?}", value.name));
+    }
+    let dims = float_dims(value)?;
+    match dims.as_slice() {
+        [None | Some(0), Some(width)] if (1..=MAX_OUTPUTS as i64).contains(width) => Ok(*width as usize),
+        _ => Err(format!(
+            "expected the shape [n, d] with n dynamic and d from 1 to {MAX_OUTPUTS}, found {dims:?}"
+        )),
+    }
+}
+
+/// The dimensions of a float32 tensor, `None` where they are dynamic.
+fn float_dims(value: &ValueInfo) -> Result<Vec<Option<i64>>, String> {
     let Some(Type { tensor: Some(tensor) }) = &value.kind else { return Err("not a tensor".into()) };
     if tensor.elem_type != ONNX_FLOAT {
         return Err(format!("expected float32 (element type 1), found element type {}", tensor.elem_type));
     }
-    let dims: Vec<Option<i64>> = tensor.shape.iter().flat_map(|s| s.dim.iter().map(|d| d.value)).collect();
-    match dims.as_slice() {
-        [None | Some(0), Some(width)] if *width == WIDTH as i64 => Ok(()),
-        _ => Err(format!("expected the shape [n, {WIDTH}] with n dynamic, found {dims:?}")),
-    }
+    Ok(tensor.shape.iter().flat_map(|s| s.dim.iter().map(|d| d.value)).collect())
 }
 
 #[cfg(test)]
@@ -254,7 +384,7 @@ mod tests {
 
     /// A model whose only operator gives a value of this name.
     fn model_giving(name: &str) -> Vec<u8> {
-        let dim = [None, Some(WIDTH as i64)].map(|value| Dimension { value }).to_vec();
+        let dim = [None, Some(SHOT_WIDTH as i64)].map(|value| Dimension { value }).to_vec();
         let kind = Type { tensor: Some(TensorType { elem_type: ONNX_FLOAT, shape: Some(Shape { dim }) }) };
         let value = |name: &str| ValueInfo { name: name.into(), kind: Some(kind.clone()) };
         let metadata = ModelMetadata::example();
@@ -262,7 +392,7 @@ mod tests {
         let model = Model {
             graph: Some(Graph {
                 node: vec![Node { output: vec![name.into()], op_type: "Identity".into() }],
-                input: vec![value(INPUT)],
+                input: vec![value("shot")],
                 output: vec![value(OUTPUT)],
             }),
             opset_import: Vec::new(),
@@ -295,6 +425,12 @@ mod tests {
             (read_contract(Path::new("m.onnx"), b"text").unwrap_err().to_string(), "not an ONNX file"),
             (broken(&|m| m.graph = None), "no graph"),
             (broken(&|m| m.graph.as_mut().unwrap().input.clear()), "input: expected one"),
+            (
+                broken(&|m| m.graph.as_mut().unwrap().input[0].name = "colour".into()),
+                "\"colour\" is not a quantity",
+            ),
+            (broken(&|m| m.graph.as_mut().unwrap().input[0].name = "mass".into()), "format 1"),
+            (broken(&|m| set(m, "fmnet.format_version", "9")), "format 9"),
             (broken(&|m| m.graph.as_mut().unwrap().output[0].kind = None), "output: not a tensor"),
             (broken(&|m| set(m, "fmnet.solver", "magic")), "fmnet.solver is \"magic\""),
             (broken(&|m| set(m, "fmnet.k", "many")), "fmnet.k is \"many\""),

@@ -11,7 +11,7 @@ mod proto;
 mod tract;
 
 use crate::Matrix;
-use contract::{ModelMetadata, WIDTH};
+use contract::{Contract, ModelInput, ModelMetadata};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -75,18 +75,27 @@ pub enum NetworkError {
         /// Its reason.
         reason: String,
     },
-    /// The input has another width.
-    #[error("the network takes descriptors of width {WIDTH}, not {width}; compute SHOT with 10 bins")]
-    Width {
-        /// Width of the input.
-        width: usize,
+    /// An input has another size.
+    #[error(
+        "the network takes {quantity} of {expected} numbers for {n} vertices, not {found}; compute its inputs as its \
+         metadata says"
+    )]
+    InputSize {
+        /// The input.
+        quantity: &'static str,
+        /// Vertices.
+        n: usize,
+        /// Numbers that fit.
+        expected: usize,
+        /// Numbers given.
+        found: usize,
     },
 }
 
 /// A loaded model.
 pub struct DescriptorNetwork {
     path: PathBuf,
-    metadata: ModelMetadata,
+    contract: Contract,
     fingerprint: [u8; 32],
     backend: Backend,
     engine: Box<dyn Engine>,
@@ -94,15 +103,22 @@ pub struct DescriptorNetwork {
 
 /// What a back-end does. Results may differ between back-ends by rounding only.
 trait Engine: Send + Sync {
-    /// `[n, 352]` to `[n, 352]`.
-    fn run(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, String>;
+    /// The descriptors, `[n, d]` row-major, of `n` vertices, given an array for each input of the graph.
+    fn run(&self, n: usize, inputs: &[&[f32]]) -> Result<Vec<f32>, String>;
+}
+
+impl ModelInput {
+    /// The dimensions for `n` vertices.
+    fn dims(&self, n: usize) -> Vec<usize> {
+        self.quantity.dims(self.width).into_iter().map(|dim| dim.unwrap_or(n)).collect()
+    }
 }
 
 impl fmt::Debug for DescriptorNetwork {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.debug_struct("DescriptorNetwork")
             .field("path", &self.path)
-            .field("metadata", &self.metadata)
+            .field("contract", &self.contract)
             .field("backend", &self.backend)
             .finish_non_exhaustive()
     }
@@ -124,18 +140,23 @@ impl DescriptorNetwork {
     /// # Errors
     /// If the file breaks the contract, the back-end is not in this build, or refuses the model.
     pub fn from_bytes(path: &Path, bytes: &[u8], backend: Backend) -> Result<Self, NetworkError> {
-        let metadata = contract::read_contract(path, bytes)?;
-        let engine = load_engine(bytes, &metadata, backend).map_err(|failure| match failure {
+        let contract = contract::read_contract(path, bytes)?;
+        let engine = load_engine(bytes, &contract, backend).map_err(|failure| match failure {
             Failure::Absent => NetworkError::BackendAbsent { backend },
             Failure::Refused(reason) => NetworkError::Backend { path: path.to_path_buf(), backend, reason },
         })?;
         let fingerprint = *blake3::hash(bytes).as_bytes();
-        Ok(Self { path: path.to_path_buf(), metadata, fingerprint, backend, engine })
+        Ok(Self { path: path.to_path_buf(), contract, fingerprint, backend, engine })
     }
 
     /// What travels with the model.
     pub fn metadata(&self) -> &ModelMetadata {
-        &self.metadata
+        &self.contract.metadata
+    }
+
+    /// What it takes and gives.
+    pub fn contract(&self) -> &Contract {
+        &self.contract
     }
 
     /// A hash of the model file, for cache keys.
@@ -148,17 +169,34 @@ impl DescriptorNetwork {
         self.backend
     }
 
-    /// Learned descriptors `[n, 352]` of SHOT descriptors `[n, 352]`.
+    /// Learned descriptors `[n, d]` of a shape of `n` vertices. `inputs` has an array, row-major, for each of
+    /// [`Contract::inputs`].
     ///
     /// # Errors
-    /// If the input has another width, or the back-end fails.
-    pub fn descriptors(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, NetworkError> {
-        if shot.cols() != WIDTH {
-            return Err(NetworkError::Width { width: shot.cols() });
+    /// If an input has another size, or the back-end fails.
+    ///
+    /// # Panics
+    /// If there are not as many arrays as the model has inputs.
+    pub fn descriptors(&self, n: usize, inputs: &[&[f32]]) -> Result<Matrix<f32>, NetworkError> {
+        assert_eq!(inputs.len(), self.contract.inputs.len(), "an array for each input");
+        for (input, array) in self.contract.inputs.iter().zip(inputs) {
+            let expected = input.dims(n).iter().product();
+            if array.len() != expected {
+                let (quantity, found) = (input.quantity.name(), array.len());
+                return Err(NetworkError::InputSize { quantity, n, expected, found });
+            }
         }
         let failed =
             |reason| NetworkError::Backend { path: self.path.clone(), backend: self.backend, reason };
-        self.engine.run(shot).map_err(failed)
+        let values = self.engine.run(n, inputs).map_err(failed)?;
+        let outputs = self.contract.outputs;
+        if values.len() != n * outputs {
+            return Err(failed(format!(
+                "an output of {} numbers instead of {n} x {outputs}; export the model anew",
+                values.len()
+            )));
+        }
+        Ok(Matrix::from_vec(n, outputs, values))
     }
 }
 
@@ -171,12 +209,12 @@ enum Failure {
 }
 
 #[cfg_attr(not(any(feature = "tract", feature = "ort")), allow(unused_variables))]
-fn load_engine(bytes: &[u8], metadata: &ModelMetadata, backend: Backend) -> Result<Box<dyn Engine>, Failure> {
+fn load_engine(bytes: &[u8], contract: &Contract, backend: Backend) -> Result<Box<dyn Engine>, Failure> {
     match backend {
         #[cfg(feature = "tract")]
-        Backend::Tract => Ok(Box::new(tract::TractEngine::load(bytes, metadata).map_err(Failure::Refused)?)),
+        Backend::Tract => Ok(Box::new(tract::TractEngine::load(bytes, contract).map_err(Failure::Refused)?)),
         #[cfg(feature = "ort")]
-        Backend::Ort => Ok(Box::new(ort::OrtEngine::load(bytes).map_err(Failure::Refused)?)),
+        Backend::Ort => Ok(Box::new(ort::OrtEngine::load(bytes, contract).map_err(Failure::Refused)?)),
         #[allow(unreachable_patterns)]
         _ => Err(Failure::Absent),
     }
@@ -185,26 +223,28 @@ fn load_engine(bytes: &[u8], metadata: &ModelMetadata, backend: Backend) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use contract::Quantity;
 
     struct Failing;
 
     impl Engine for Failing {
-        fn run(&self, _: &Matrix<f32>) -> Result<Matrix<f32>, String> {
+        fn run(&self, _: usize, _: &[&[f32]]) -> Result<Vec<f32>, String> {
             Err("no".into())
         }
     }
 
     #[test]
-    fn a_failure_names_the_model_file() {
+    fn a_failure_names_the_model_file_and_a_wrong_size_the_input() {
+        let input = ModelInput { quantity: Quantity::Eigenvectors, width: 3 };
         let network = DescriptorNetwork {
             path: "m.onnx".into(),
-            metadata: ModelMetadata::example(),
+            contract: Contract { inputs: vec![input], outputs: 2, metadata: ModelMetadata::example() },
             fingerprint: [0; 32],
             backend: Backend::Tract,
             engine: Box::new(Failing),
         };
-        let error = |width| network.descriptors(&Matrix::zeros(1, width)).unwrap_err().to_string();
-        assert_eq!(error(WIDTH), "m.onnx: tract: no");
-        assert!(error(320).ends_with("not 320; compute SHOT with 10 bins"), "{}", error(320));
+        let error = |len| network.descriptors(4, &[&vec![0.0; len]]).unwrap_err().to_string();
+        assert_eq!(error(12), "m.onnx: tract: no");
+        assert!(error(11).starts_with("the network takes eigenvectors of 12 numbers for 4 vertices, not 11"));
     }
 }

@@ -1,8 +1,7 @@
 //! The back-end on onnxruntime, whose library is loaded at run time.
 
 use super::Engine;
-use super::contract::{INPUT, OUTPUT, WIDTH};
-use crate::Matrix;
+use super::contract::{Contract, ModelInput, OUTPUT};
 use ort::environment::Environment;
 use ort::session::Session;
 use ort::value::TensorRef;
@@ -12,11 +11,12 @@ use std::sync::{Mutex, OnceLock};
 const LIBRARY_VARIABLE: &str = "ORT_DYLIB_PATH";
 
 pub(super) struct OrtEngine {
+    inputs: Vec<ModelInput>,
     session: Mutex<Session>,
 }
 
 impl OrtEngine {
-    pub(super) fn load(bytes: &[u8]) -> Result<Self, String> {
+    pub(super) fn load(bytes: &[u8], contract: &Contract) -> Result<Self, String> {
         let threads = rayon::current_num_threads();
         let session = Session::builder(environment()?)
             .map_err(|e| e.to_string())?
@@ -24,7 +24,7 @@ impl OrtEngine {
             .map_err(|e| e.to_string())?
             .commit_from_memory(bytes)
             .map_err(|e| e.to_string())?;
-        Ok(Self { session: Mutex::new(session) })
+        Ok(Self { inputs: contract.inputs.clone(), session: Mutex::new(session) })
     }
 }
 
@@ -46,18 +46,15 @@ fn load_library() -> Result<Environment, String> {
 }
 
 impl Engine for OrtEngine {
-    fn run(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, String> {
+    fn run(&self, n: usize, inputs: &[&[f32]]) -> Result<Vec<f32>, String> {
         let mut session = self.session.lock().map_err(|e| e.to_string())?;
-        let input =
-            TensorRef::from_array_view(([shot.rows(), WIDTH], shot.data())).map_err(|e| e.to_string())?;
-        let outputs = session.run(ort::inputs![INPUT => input]).map_err(|e| e.to_string())?;
-        let (shape, values) = outputs[OUTPUT].try_extract_tensor::<f32>().map_err(|e| e.to_string())?;
-        if values.len() != shot.rows() * WIDTH {
-            return Err(format!(
-                "output of shape {shape:?} instead of {:?}; export the model anew",
-                [shot.rows(), WIDTH]
-            ));
+        let mut named = Vec::with_capacity(inputs.len());
+        for (input, values) in self.inputs.iter().zip(inputs) {
+            let tensor = TensorRef::from_array_view((input.dims(n), *values)).map_err(|e| e.to_string())?;
+            named.push((input.quantity.name(), tensor));
         }
-        Ok(Matrix::from_vec(shot.rows(), WIDTH, values.to_vec()))
+        let outputs = session.run(named).map_err(|e| e.to_string())?;
+        let (_, values) = outputs[OUTPUT].try_extract_tensor::<f32>().map_err(|e| e.to_string())?;
+        Ok(values.to_vec())
     }
 }

@@ -5,8 +5,7 @@
 //! depend on each other they are split into blocks of a fixed size instead.
 
 use super::Engine;
-use super::contract::{ModelMetadata, WIDTH};
-use crate::Matrix;
+use super::contract::{Contract, ModelInput};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -23,50 +22,49 @@ type Plan = Arc<TypedRunnableModel>;
 
 pub(super) struct TractEngine {
     graph: InferenceModel,
+    inputs: Vec<ModelInput>,
     rows_depend: bool,
     plans: Mutex<BTreeMap<usize, Plan>>,
 }
 
 impl TractEngine {
-    pub(super) fn load(bytes: &[u8], metadata: &ModelMetadata) -> Result<Self, String> {
+    pub(super) fn load(bytes: &[u8], contract: &Contract) -> Result<Self, String> {
         let graph =
             guarded(|| tract_onnx::onnx().model_for_read(&mut &*bytes).map_err(|e| format!("{e:#}")))?;
-        Ok(Self { graph, rows_depend: metadata.per_shape_statistics, plans: Mutex::default() })
+        let rows_depend = contract.metadata.per_shape_statistics || contract.inputs.len() > 1;
+        Ok(Self { graph, inputs: contract.inputs.clone(), rows_depend, plans: Mutex::default() })
     }
 
-    fn plan(&self, rows: usize) -> Result<Plan, String> {
+    fn plan(&self, n: usize) -> Result<Plan, String> {
         let mut plans = self.plans.lock().map_err(|e| e.to_string())?;
-        if let Some(plan) = plans.get(&rows) {
+        if let Some(plan) = plans.get(&n) {
             return Ok(plan.clone());
         }
-        let fact = InferenceFact::dt_shape(f32::datum_type(), tvec![rows, WIDTH]);
-        let graph = self.graph.clone().with_input_fact(0, fact).and_then(|g| g.into_optimized());
-        let plan = graph.and_then(|g| g.into_runnable()).map_err(|e| format!("{e:#}"))?;
+        let mut graph = self.graph.clone();
+        for (index, input) in self.inputs.iter().enumerate() {
+            let fact = InferenceFact::dt_shape(f32::datum_type(), input.dims(n));
+            graph.set_input_fact(index, fact).map_err(|e| format!("{e:#}"))?;
+        }
+        let plan = graph.into_optimized().and_then(|g| g.into_runnable()).map_err(|e| format!("{e:#}"))?;
         if plans.len() == KEPT_PLANS {
             plans.pop_first();
         }
-        plans.insert(rows, plan.clone());
+        plans.insert(n, plan.clone());
         Ok(plan)
     }
 
-    fn run_rows(&self, rows: &[f32]) -> Result<Vec<f32>, String> {
-        let n = rows.len() / WIDTH;
-        let input = Tensor::from_shape(&[n, WIDTH], rows).map_err(|e| format!("{e:#}"))?;
-        let output = self.plan(n)?.run(tvec!(input.into())).map_err(|e| format!("{e:#}"))?;
+    fn run_rows(&self, n: usize, inputs: &[&[f32]]) -> Result<Vec<f32>, String> {
+        let tensor = |(input, values): (&ModelInput, &&[f32])| {
+            Ok(Tensor::from_shape(&input.dims(n), values).map_err(|e| format!("{e:#}"))?.into())
+        };
+        let inputs: TVec<TValue> =
+            self.inputs.iter().zip(inputs).map(tensor).collect::<Result<_, String>>()?;
+        let output = self.plan(n)?.run(inputs).map_err(|e| format!("{e:#}"))?;
         let output = output.first().ok_or("no output")?;
-        let values = output
+        output
             .try_as_plain_ram()
             .and_then(|v| Ok(v.as_slice::<f32>()?.to_vec()))
-            .map_err(|e| format!("{e:#}"))?;
-        if values.len() == rows.len() {
-            Ok(values)
-        } else {
-            Err(format!(
-                "output of shape {:?} instead of {:?}; export the model anew",
-                output.shape(),
-                [n, WIDTH]
-            ))
-        }
+            .map_err(|e| format!("{e:#}"))
     }
 }
 
@@ -81,18 +79,16 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
 }
 
 impl Engine for TractEngine {
-    fn run(&self, shot: &Matrix<f32>) -> Result<Matrix<f32>, String> {
-        let values = if self.rows_depend {
-            multithread_tract_scope(Executor::RayonGlobal, || guarded(|| self.run_rows(shot.data())))?
-        } else {
-            let blocks: Vec<Vec<f32>> = shot
-                .data()
-                .par_chunks(BLOCK_ROWS * WIDTH)
-                .map(|rows| guarded(|| self.run_rows(rows)))
-                .collect::<Result<_, _>>()?;
-            blocks.concat()
-        };
-        Ok(Matrix::from_vec(shot.rows(), WIDTH, values))
+    fn run(&self, n: usize, inputs: &[&[f32]]) -> Result<Vec<f32>, String> {
+        if self.rows_depend {
+            return multithread_tract_scope(Executor::RayonGlobal, || guarded(|| self.run_rows(n, inputs)));
+        }
+        let width = self.inputs[0].width;
+        let blocks: Vec<Vec<f32>> = inputs[0]
+            .par_chunks(BLOCK_ROWS * width)
+            .map(|rows| guarded(|| self.run_rows(rows.len() / width, &[rows])))
+            .collect::<Result<_, _>>()?;
+        Ok(blocks.concat())
     }
 }
 

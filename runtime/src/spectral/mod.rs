@@ -5,16 +5,20 @@
 
 mod basis;
 mod eigen;
+mod gradients;
 mod laplacian;
 mod mass;
 mod sparse;
 mod stiffness;
 #[cfg(test)]
 mod test_shapes;
+mod wks;
 
 pub use basis::Eigenbasis;
 pub use eigen::{EigenError, EigenInfo, EigenOptions, eigenbasis};
+pub use gradients::{EigenGradients, eigen_gradients};
 pub use laplacian::Laplacian;
 pub use mass::lumped_mass;
 pub use sparse::SparseMatrix;
 pub use stiffness::cotangent_stiffness;
+pub use wks::{WksOptions, wks, wks_of, wks_weights};

@@ -1,7 +1,6 @@
 //! Building an ONNX graph node by node.
 
-use crate::network::Activation;
-use fmnet::network::contract::{INPUT, OUTPUT};
+use fmnet::network::contract::{OUTPUT, Quantity};
 use tract_onnx::pb::attribute_proto::AttributeType;
 use tract_onnx::pb::tensor_proto::DataType;
 use tract_onnx::pb::tensor_shape_proto::{Dimension, dimension};
@@ -15,78 +14,54 @@ const OPSET: i64 = 17;
 const IR_VERSION: i64 = 8;
 
 /// A graph under construction. Inside, features are `[width, n]`, a channel a row: tract (0.23) vectorises what it does to rows
-/// of any length, but not a row of 352 spread over all rows. Every method returns the name of its result.
-pub(super) struct GraphBuilder {
-    width: usize,
-    activation: Activation,
+/// of any length, but not a short row spread over all rows. Every method returns the name of its result.
+#[derive(Default)]
+pub struct GraphBuilder {
+    inputs: Vec<ValueInfoProto>,
     nodes: Vec<NodeProto>,
     constants: Vec<TensorProto>,
 }
 
 impl GraphBuilder {
-    pub(super) fn new(width: usize, activation: Activation, epsilon: f32) -> Self {
-        let mut builder = Self { width, activation, nodes: Vec::new(), constants: Vec::new() };
-        builder.constant("epsilon", &[1, 1], &[epsilon]);
-        builder
-    }
-
-    /// The input, a channel a row.
-    pub(super) fn input(&mut self) -> String {
-        self.node("Transpose", "channels", &[INPUT], vec![integers("perm", &[1, 0])])
+    /// Declares an input of the shape that the quantity has: `[n, width]`, `[width]` or `[n]`.
+    pub(crate) fn input(&mut self, quantity: Quantity, width: usize) -> String {
+        let dims = quantity.dims(width);
+        self.inputs.push(value(quantity.name(), &dims));
+        quantity.name().into()
     }
 
     /// `W^T x + b`, with `weight` the `[in, out]` matrix W.
-    pub(super) fn linear(&mut self, name: &str, x: &str, weight: &[f32], bias: &[f32]) -> String {
-        let bias = self.constant(&format!("{name}.bias"), &[self.width, 1], bias);
-        self.product(&format!("{name}.linear"), name, &[x, &bias], weight)
+    pub(crate) fn linear(&mut self, name: &str, x: &str, weight: &[f32], bias: &[f32]) -> String {
+        let width = bias.len();
+        let bias = self.constant(&format!("{name}.bias"), &[width, 1], bias);
+        let weight = self.constant(&format!("{name}.weight"), &[weight.len() / width, width], weight);
+        self.node("Gemm", &format!("{name}.linear"), &[&weight, x, &bias], vec![integer("transA", 1)])
     }
 
-    /// `scale (h - mean) / sqrt(variance + epsilon) + shift` with `h = W^T x` and the statistics taken over the vertices.
-    pub(super) fn normalized_linear(
-        &mut self,
-        name: &str,
-        x: &str,
-        weight: &[f32],
-        scale: &[f32],
-        shift: &[f32],
-    ) -> String {
-        let scale = self.constant(&format!("{name}.scale"), &[self.width, 1], scale);
-        let shift = self.constant(&format!("{name}.shift"), &[self.width, 1], shift);
-        let step = |part: &str| format!("{name}.{part}");
-        let h = self.product(&step("product"), name, &[x], weight);
-        let mean = self.vertex_mean(&step("mean"), &h);
-        let centered = self.node("Sub", &step("centered"), &[&h, &mean], Vec::new());
-        let square = self.node("Mul", &step("square"), &[&centered, &centered], Vec::new());
-        let variance = self.vertex_mean(&step("variance"), &square);
-        let above_zero = self.node("Add", &step("above_zero"), &[&variance, "epsilon"], Vec::new());
-        let deviation = self.node("Sqrt", &step("deviation"), &[&above_zero], Vec::new());
-        let factor = self.node("Div", &step("factor"), &[&scale, &deviation], Vec::new());
-        let scaled = self.node("Mul", &step("scaled"), &[&centered, &factor], Vec::new());
-        self.node("Add", &step("normalized"), &[&scaled, &shift], Vec::new())
+    /// `W^T x`, with `weight` the matrix W of `inputs` rows.
+    pub(crate) fn product(&mut self, name: &str, x: &str, weight: &[f32], inputs: usize) -> String {
+        let weight = self.constant(&format!("{name}.weight"), &[inputs, weight.len() / inputs], weight);
+        self.node("Gemm", name, &[&weight, x], vec![integer("transA", 1)])
     }
 
-    /// The activation of `x`.
-    pub(super) fn activation(&mut self, name: &str, x: &str) -> String {
-        match self.activation {
-            Activation::Elu => self.node("Elu", name, &[x], vec![float("alpha", 1.0)]),
-            Activation::Relu => self.node("Relu", name, &[x], Vec::new()),
-        }
+    /// The first `count` entries of `x` along an axis.
+    pub(crate) fn first(&mut self, name: &str, x: &str, along: i64, count: usize) -> String {
+        let part = |graph: &mut Self, part: &str, at: i64| graph.integers(&format!("{name}.{part}"), &[at]);
+        let start = part(self, "start", 0);
+        let end = part(self, "end", count as i64);
+        let axis = part(self, "axis", along);
+        self.node("Slice", name, &[x, &start, &end, &axis], Vec::new())
     }
 
-    /// `a + b`
-    pub(super) fn add(&mut self, name: &str, a: &str, b: &str) -> String {
-        self.node("Add", name, &[a, b], Vec::new())
-    }
-
-    /// The model whose output is `x`, by the contract.
-    pub(super) fn finish(mut self, x: &str, metadata: &[(String, String)]) -> ModelProto {
+    /// The model whose output is `x`, `[width, n]`, by the contract.
+    pub(super) fn finish(mut self, x: &str, width: usize, metadata: &[(String, String)]) -> ModelProto {
         self.node("Transpose", OUTPUT, &[x], vec![integers("perm", &[1, 0])]);
         let graph = GraphProto {
             name: "fmnet".into(),
             node: self.nodes,
             initializer: self.constants,
-            input: vec![matrix(INPUT, self.width)],
-            output: vec![matrix(OUTPUT, self.width)],
+            input: self.inputs,
+            output: vec![value(OUTPUT, &[None, Some(width)])],
             ..GraphProto::default()
         };
         let entry = |(key, value): &(String, String)| StringStringEntryProto {
@@ -104,18 +79,8 @@ impl GraphBuilder {
         }
     }
 
-    /// `W^T x`, plus a bias `[width, 1]` where one follows `x` among the inputs.
-    fn product(&mut self, name: &str, layer: &str, inputs: &[&str], weight: &[f32]) -> String {
-        let weight = self.constant(&format!("{layer}.weight"), &[self.width, self.width], weight);
-        let inputs = [&[&weight[..]], inputs].concat();
-        self.node("Gemm", name, &inputs, vec![integer("transA", 1)])
-    }
-
-    fn vertex_mean(&mut self, name: &str, x: &str) -> String {
-        self.node("ReduceMean", name, &[x], vec![integers("axes", &[1]), integer("keepdims", 1)])
-    }
-
-    fn node(
+    /// One operator.
+    pub(crate) fn node(
         &mut self,
         operator: &str,
         name: &str,
@@ -133,19 +98,37 @@ impl GraphBuilder {
         name.into()
     }
 
-    fn constant(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
+    /// A float32 constant.
+    pub(crate) fn constant(&mut self, name: &str, shape: &[usize], values: &[f32]) -> String {
+        let raw_data = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.raw_constant(name, shape, DataType::Float, raw_data)
+    }
+
+    /// A list of int64.
+    pub(crate) fn integers(&mut self, name: &str, values: &[i64]) -> String {
+        let raw_data = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        self.raw_constant(name, &[values.len()], DataType::Int64, raw_data)
+    }
+
+    fn raw_constant(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        data_type: DataType,
+        raw_data: Vec<u8>,
+    ) -> String {
         self.constants.push(TensorProto {
             name: name.into(),
             dims: shape.iter().map(|&d| d as i64).collect(),
-            data_type: DataType::Float as i32,
-            raw_data: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            data_type: data_type as i32,
+            raw_data,
             ..TensorProto::default()
         });
         name.into()
     }
 }
 
-fn float(name: &str, value: f32) -> AttributeProto {
+pub(crate) fn float(name: &str, value: f32) -> AttributeProto {
     AttributeProto {
         name: name.into(),
         r#type: AttributeType::Float as i32,
@@ -154,7 +137,7 @@ fn float(name: &str, value: f32) -> AttributeProto {
     }
 }
 
-fn integer(name: &str, value: i64) -> AttributeProto {
+pub(crate) fn integer(name: &str, value: i64) -> AttributeProto {
     AttributeProto {
         name: name.into(),
         r#type: AttributeType::Int as i32,
@@ -163,7 +146,7 @@ fn integer(name: &str, value: i64) -> AttributeProto {
     }
 }
 
-fn integers(name: &str, values: &[i64]) -> AttributeProto {
+pub(crate) fn integers(name: &str, values: &[i64]) -> AttributeProto {
     AttributeProto {
         name: name.into(),
         r#type: AttributeType::Ints as i32,
@@ -172,14 +155,23 @@ fn integers(name: &str, values: &[i64]) -> AttributeProto {
     }
 }
 
-/// A float32 value of shape `[n, width]`.
-fn matrix(name: &str, width: usize) -> ValueInfoProto {
-    let dimension = |value| Dimension { value: Some(value), ..Dimension::default() };
-    let rows = dimension(dimension::Value::DimParam("n".into()));
-    let cols = dimension(dimension::Value::DimValue(width as i64));
+/// The attribute `axes` of a reduction over one axis.
+pub(crate) fn axis(axis: i64) -> AttributeProto {
+    integers("axes", &[axis])
+}
+
+/// A float32 value; `None` stands for the number of vertices.
+fn value(name: &str, dims: &[Option<usize>]) -> ValueInfoProto {
+    let dimension = |dim: &Option<usize>| {
+        let value = match dim {
+            None => dimension::Value::DimParam("n".into()),
+            Some(width) => dimension::Value::DimValue(*width as i64),
+        };
+        Dimension { value: Some(value), ..Dimension::default() }
+    };
     let tensor = type_proto::Tensor {
         elem_type: DataType::Float as i32,
-        shape: Some(TensorShapeProto { dim: vec![rows, cols] }),
+        shape: Some(TensorShapeProto { dim: dims.iter().map(dimension).collect() }),
     };
     let kind = TypeProto { value: Some(type_proto::Value::TensorType(tensor)), ..TypeProto::default() };
     ValueInfoProto { name: name.into(), r#type: Some(kind), ..ValueInfoProto::default() }

@@ -1,306 +1,154 @@
-//! The descriptor network: residual blocks on SHOT descriptors (paper, section "Implementation details").
+//! Descriptor networks with gradients: the paper's residual network and DiffusionNet.
 //!
-//! Each block is `y = act(norm1(x W1))`, `out = act(x + norm2(y W2))`, with `x` `[n, width]` and weights
-//! `[width in, width out]`; there are no biases, which a normalisation would cancel. A normalisation maps each channel to
-//! mean 0 and variance 1, then multiplies it by a learnable scale and adds a learnable shift.
-//!
-//! All parameters live in one flat variable, in the order of [`Network::parameters`]; on the CPU the network is one fused
-//! op, elsewhere it is composed of Candle's ops.
+//! A network maps what it is given of a shape ([`NetworkInput`]) to descriptors `[n, d]`. All its parameters live in one flat
+//! variable; [`Network::parameters`] names its parts. On the CPU a network is one fused op with a backward pass written by
+//! hand; elsewhere it is composed of Candle's ops.
 
-mod composed;
-mod fused;
-mod init;
-mod norm;
-mod pool;
-mod residual;
+pub mod diffusion;
+pub mod residual;
 
-pub use init::WeightInit;
+pub use diffusion::{DiffusionNetwork, DiffusionOptions};
+pub use residual::{Activation, BatchMoments, Normalization, ResidualNetwork, ResidualOptions, WeightInit};
 
-use candle_core::{DType, Device, Result, Tensor, Var, bail};
-use fused::{FusedNetwork, SavedActivations, Statistics};
-use norm::Moments;
-use pool::BufferPool;
+use candle_core::{DType, Device, Result, Tensor, Var};
+use fmnet::Matrix;
+use fmnet::diffusion_net::{Operators, Parameter};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
-/// Activation between the layers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Activation {
-    /// `x` above 0, `exp(x) - 1` below (the paper).
-    #[default]
-    Elu,
-    /// `max(x, 0)` (the authors' code).
-    Relu,
+/// What a network is given of a shape.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NetworkInput {
+    /// Functions on the shape, `[n, inputs]`.
+    pub features: Matrix<f32>,
+    /// The shape's operators at unit area, for networks that see the surface; without eigenpairs for others.
+    pub operators: Operators<f32>,
 }
 
-/// Over which rows a normalisation takes its statistics.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Normalization {
-    /// Over the vertices of each shape, in training and at test time, as the authors' code has it in effect.
-    #[default]
-    PerShape,
-    /// Over both shapes of a pair in training; at test time exponential averages of those, which an export folds into the
-    /// linear layers.
-    Running,
+impl NetworkInput {
+    /// The functions as a tensor.
+    fn features_tensor(&self, device: &Device) -> Result<Tensor> {
+        let shape = (self.features.rows(), self.features.cols());
+        Tensor::from_slice(self.features.data(), shape, device)
+    }
 }
 
-/// What the network looks like and how it starts.
+/// Running statistics of normalisations, `[blocks, 2]`; none where a network keeps none.
+pub type Statistics = Vec<[BatchMoments; 2]>;
+
+/// A network with its parameters.
+pub trait Network: Send {
+    /// All parameters, flat, in the order of [`Network::parameters`].
+    fn variable(&self) -> &Var;
+
+    /// Names, shapes and places of the parameters.
+    fn parameters(&self) -> Vec<Parameter>;
+
+    /// Width of the input functions.
+    fn n_inputs(&self) -> usize;
+
+    /// Width of the descriptors.
+    fn n_outputs(&self) -> usize;
+
+    /// Descriptors of each shape at test time, `[n, d]`; no gradient.
+    ///
+    /// # Errors
+    /// If an input does not fit the network.
+    fn forward(&self, shapes: &[&NetworkInput]) -> Result<Vec<Tensor>>;
+
+    /// Descriptors of the shapes of a training step, `[n, d]` each, differentiable by [`Network::variable`] once, and the
+    /// statistics of the step, for [`Network::accept`].
+    ///
+    /// # Errors
+    /// If an input does not fit the network.
+    fn forward_train(&mut self, shapes: &[&NetworkInput]) -> Result<(Vec<Tensor>, Statistics)>;
+
+    /// Averages the statistics of a step that was taken into the running ones.
+    fn accept(&mut self, _statistics: Statistics) {}
+
+    /// The running statistics.
+    fn statistics(&self) -> Statistics {
+        Vec::new()
+    }
+
+    /// Replaces the running statistics.
+    ///
+    /// # Errors
+    /// If they do not fit the network.
+    fn set_statistics(&mut self, statistics: Statistics) -> Result<()> {
+        match statistics.len() {
+            0 => Ok(()),
+            n => candle_core::bail!("running statistics of {n} blocks for a network that keeps none"),
+        }
+    }
+
+    /// Adds the network to an ONNX graph; returns the name of its output, `[d, n]`, a channel a row.
+    fn graph(
+        &self,
+        graph: &mut crate::export::GraphBuilder,
+        parameters: &crate::export::Parameters,
+    ) -> String;
+}
+
+/// Copies the flat parameters out, `[p]`.
+///
+/// # Errors
+/// If they cannot be read from the device.
+pub fn parameter_values(network: &dyn Network) -> Result<Vec<f32>> {
+    network.variable().as_tensor().to_dtype(DType::F32)?.to_vec1()
+}
+
+/// Replaces the flat parameters, `[p]`.
+///
+/// # Errors
+/// If there are more or fewer.
+pub fn set_parameter_values(network: &dyn Network, values: &[f32]) -> Result<()> {
+    network.variable().set(&Tensor::from_slice(values, values.len(), network.variable().device())?)
+}
+
+/// Which network, and what it looks like.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct NetworkOptions {
-    /// Number of residual blocks; at least 1, default 7.
-    pub blocks: usize,
-    /// Number of channels; default 352, that of SHOT.
-    pub width: usize,
-    /// Activation; default ELU.
-    pub activation: Activation,
-    /// Statistics of the normalisations; default per shape.
-    pub normalization: Normalization,
-    /// Added to variances; above 0, default 1e-5.
-    pub epsilon: f64,
-    /// Share of the new value in a running statistic; 0 to 1, default 0.01.
-    pub momentum: f64,
-    /// Distribution of the initial weights; default Xavier.
-    pub weight_init: WeightInit,
-    /// Initial scale of each block's second normalisation; 0 starts at the identity; default 1.
-    pub residual_scale: f64,
-    /// Seed of the initial weights; default 0.
-    pub seed: u64,
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum NetworkOptions {
+    /// The paper's, on SHOT descriptors point by point.
+    Residual(ResidualOptions),
+    /// DiffusionNet, which sees the surface.
+    Diffusion(DiffusionOptions),
 }
 
 impl Default for NetworkOptions {
     fn default() -> Self {
-        Self {
-            blocks: 7,
-            width: 352,
-            activation: Activation::Elu,
-            normalization: Normalization::PerShape,
-            epsilon: 1e-5,
-            momentum: 0.01,
-            weight_init: WeightInit::Xavier,
-            residual_scale: 1.0,
-            seed: 0,
+        Self::Diffusion(DiffusionOptions::default())
+    }
+}
+
+impl NetworkOptions {
+    /// Says which option is out of its range.
+    ///
+    /// # Errors
+    /// Its name, value and range.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        match self {
+            Self::Residual(options) => options.check(),
+            Self::Diffusion(options) => options.check(),
         }
     }
-}
 
-/// A named part of the flat parameter vector.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ParameterInfo {
-    /// For instance `blocks.0.linear1.weight`, `blocks.0.norm1.scale`, `blocks.0.norm1.shift`.
-    pub name: String,
-    /// `[width in, width out]` for weights, `[width]` for scales and shifts.
-    pub shape: Vec<usize>,
-    /// Index of the first element in the flat vector.
-    pub offset: usize,
-}
-
-impl ParameterInfo {
-    /// Number of elements.
-    pub fn len(&self) -> usize {
-        self.shape.iter().product()
-    }
-
-    /// Whether there are no elements.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// Mean and variance, `[width]` each, that a normalisation uses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BatchMoments {
-    /// Mean of each channel.
-    pub mean: Vec<f64>,
-    /// Biased variance of each channel.
-    pub variance: Vec<f64>,
-}
-
-impl BatchMoments {
-    fn to_moments(&self) -> Moments {
-        Moments { count: 1.0, mean: self.mean.clone(), variance: self.variance.clone() }
-    }
-
-    fn to_tensors(&self, like: &Tensor) -> Result<(Tensor, Tensor)> {
-        let row = |v: &[f64]| Tensor::new(v, &Device::Cpu)?.to_dtype(like.dtype())?.to_device(like.device());
-        Ok((row(&self.mean)?.unsqueeze(0)?, row(&self.variance)?.unsqueeze(0)?))
-    }
-
-    fn from_tensors((mean, variance): &(Tensor, Tensor)) -> Result<Self> {
-        let row = |t: &Tensor| t.flatten_all()?.to_dtype(DType::F64)?.to_vec1();
-        Ok(Self { mean: row(mean)?, variance: row(variance)? })
-    }
-}
-
-/// The network with its parameters and running statistics.
-pub struct Network {
-    options: NetworkOptions,
-    flat: Var,
-    running: Vec<[BatchMoments; 2]>,
-    pool: Arc<BufferPool<f32>>,
-}
-
-impl Network {
-    /// A network with seeded initial parameters; fails where `blocks`, `width` or `epsilon` is out of range.
-    pub fn new(options: NetworkOptions, device: &Device) -> Result<Self> {
-        if options.blocks == 0 || options.width == 0 || options.epsilon <= 0.0 {
-            bail!("the network needs blocks >= 1, width >= 1 and epsilon > 0; got {options:?}");
+    /// Names, shapes and places of the network's parameters.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        match self {
+            Self::Residual(options) => options.parameters(),
+            Self::Diffusion(options) => options.parameters(),
         }
-        let NetworkOptions { blocks, width, weight_init, residual_scale, seed, .. } = options;
-        let flat = init::initialize(blocks, width, weight_init, residual_scale, seed);
-        let len = flat.len();
-        let fresh = BatchMoments { mean: vec![0.0; width], variance: vec![1.0; width] };
-        Ok(Self {
-            flat: Var::from_vec(flat, len, device)?,
-            running: vec![[fresh.clone(), fresh]; blocks],
-            pool: Arc::default(),
-            options,
+    }
+
+    /// A network with seeded initial parameters.
+    ///
+    /// # Errors
+    /// If an option is out of its range.
+    pub fn build(&self, seed: u64, device: &Device) -> Result<Box<dyn Network>> {
+        Ok(match self {
+            Self::Residual(options) => Box::new(ResidualNetwork::new(options.clone(), seed, device)?),
+            Self::Diffusion(options) => Box::new(DiffusionNetwork::new(options.clone(), seed, device)?),
         })
     }
-
-    /// What the network looks like.
-    pub fn options(&self) -> &NetworkOptions {
-        &self.options
-    }
-
-    /// All parameters, flat, in the order of [`Self::parameters`].
-    pub fn variable(&self) -> &Var {
-        &self.flat
-    }
-
-    /// Names, shapes and places of the parameters: block by block, weight, scale and shift of its two halves.
-    pub fn parameters(&self) -> Vec<ParameterInfo> {
-        let width = self.options.width;
-        let mut offset = 0;
-        let mut infos = Vec::new();
-        for block in 0..self.options.blocks {
-            for half in 1..=2 {
-                let parts = [
-                    (format!("linear{half}.weight"), vec![width, width]),
-                    (format!("norm{half}.scale"), vec![width]),
-                    (format!("norm{half}.shift"), vec![width]),
-                ];
-                for (name, shape) in parts {
-                    let info = ParameterInfo { name: format!("blocks.{block}.{name}"), shape, offset };
-                    offset += info.len();
-                    infos.push(info);
-                }
-            }
-        }
-        infos
-    }
-
-    /// Copies the flat parameters out, `[p]`.
-    pub fn parameter_values(&self) -> Result<Vec<f32>> {
-        self.flat.as_tensor().to_vec1()
-    }
-
-    /// Replaces the flat parameters, `[p]`; fails where there are more or fewer.
-    pub fn set_parameter_values(&mut self, values: &[f32]) -> Result<()> {
-        self.flat.set(&Tensor::from_slice(values, values.len(), self.flat.device())?)
-    }
-
-    /// The running statistics, `[blocks, 2]`: of each block, its two normalisations. Used with [`Normalization::Running`]
-    /// only.
-    pub fn running_statistics(&self) -> &[[BatchMoments; 2]] {
-        &self.running
-    }
-
-    /// Replaces the running statistics; fails where they are not of as many blocks or of another width.
-    pub fn set_running_statistics(&mut self, statistics: Vec<[BatchMoments; 2]>) -> Result<()> {
-        let fits =
-            |m: &BatchMoments| m.mean.len() == self.options.width && m.variance.len() == self.options.width;
-        if statistics.len() != self.options.blocks || !statistics.iter().flatten().all(fits) {
-            bail!(
-                "running statistics do not fit {} blocks of width {}",
-                self.options.blocks,
-                self.options.width
-            );
-        }
-        self.running = statistics;
-        Ok(())
-    }
-
-    /// Descriptors of the shapes at test time, from their inputs `[n, width]`; no gradient. The rows of all shapes lie one
-    /// below the other, `[sum of n, width]`. Fails where a shape has no rows or another width.
-    pub fn forward(&self, shapes: &[Tensor]) -> Result<Tensor> {
-        let running = self.options.normalization == Normalization::Running;
-        let (out, _) = self.run(shapes, running.then_some(self.running.as_slice()), false)?;
-        Ok(out.detach())
-    }
-
-    /// Descriptors of the shapes of a training step, differentiable by [`Self::variable`] once; laid out as by
-    /// [`Self::forward`]. Updates the running statistics where the network uses them.
-    pub fn forward_train(&mut self, shapes: &[Tensor]) -> Result<Tensor> {
-        let (out, moments) = self.run(shapes, None, true)?;
-        let momentum = self.options.momentum;
-        let blend = |old: &mut [f64], new: &[f64]| {
-            old.iter_mut().zip(new).for_each(|(old, new)| *old += momentum * (new - *old));
-        };
-        for (running, batch) in self.running.iter_mut().flatten().zip(moments.iter().flatten()) {
-            blend(&mut running.mean, &batch.mean);
-            blend(&mut running.variance, &batch.variance);
-        }
-        Ok(out)
-    }
-
-    /// Runs the network; returns the batch's moments too where the running statistics want them.
-    fn run(
-        &self,
-        shapes: &[Tensor],
-        fixed: Option<&[[BatchMoments; 2]]>,
-        train: bool,
-    ) -> Result<(Tensor, Vec<[BatchMoments; 2]>)> {
-        let rows = shapes.iter().map(|shape| Ok(shape.dims2()?.0)).collect::<Result<Vec<_>>>()?;
-        let per_shape = self.options.normalization == Normalization::PerShape;
-        let groups = if per_shape { rows.clone() } else { vec![rows.iter().sum()] };
-        let input = Tensor::cat(shapes, 0)?;
-        if input.dims2()?.1 != self.options.width || rows.contains(&0) {
-            bail!("the network takes shapes [n, {}] with n >= 1; got rows {rows:?}", self.options.width);
-        }
-        let track = !per_shape && train;
-        if input.device().is_cpu() {
-            return self.run_fused(&input, groups, fixed, train, track);
-        }
-        let out = composed::forward(&self.options, self.flat.as_tensor(), &input, &groups, fixed)?;
-        let read = |[first, second]: &[(Tensor, Tensor); 2]| {
-            Ok([BatchMoments::from_tensors(first)?, BatchMoments::from_tensors(second)?])
-        };
-        let tracked = if track { out.moments.as_slice() } else { &[] };
-        Ok((out.descriptors, tracked.iter().map(read).collect::<Result<_>>()?))
-    }
-
-    fn run_fused(
-        &self,
-        input: &Tensor,
-        groups: Vec<usize>,
-        fixed: Option<&[[BatchMoments; 2]]>,
-        train: bool,
-        track: bool,
-    ) -> Result<(Tensor, Vec<[BatchMoments; 2]>)> {
-        let statistics = match fixed {
-            Some(blocks) => Statistics::Fixed { rows: input.dims2()?.0, blocks: blocks.to_vec() },
-            None => Statistics::Groups(groups),
-        };
-        let saved = SavedActivations::<f32>::default();
-        let op = FusedNetwork {
-            input: input.flatten_all()?.to_vec1()?,
-            width: self.options.width,
-            blocks: self.options.blocks,
-            epsilon: self.options.epsilon,
-            activation: self.options.activation,
-            statistics,
-            train,
-            pool: self.pool.clone(),
-            saved: saved.clone(),
-        };
-        let out = self.flat.as_tensor().apply_op1(op)?;
-        let moments = if track { fused::batch_moments(&saved) } else { Vec::new() };
-        Ok((out, moments))
-    }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,8 +1,9 @@
 //! What each experiment consists of.
 
 use super::{Experiment, Preparation, Settings, Test, TestMethod, Training, training_folder};
-use crate::config::{List, LossKind, Sampling, SolverKind, TrainConfig};
+use crate::config::{List, Sampling, SolverKind, TrainConfig};
 use crate::dataset::Split;
+use crate::losses::LossOptions;
 use fmnet::pipeline::Refinement;
 use std::path::Path;
 
@@ -43,9 +44,9 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
                here subjects 0-5 train and 6-7 test.",
         preparation: None,
         trainings: vec![
-            training(regularized, config(regularized, SolverKind::Regularized, LossKind::Soft)),
-            training(plain, config(plain, SolverKind::LeastSquares, LossKind::Soft)),
-            training(siamese, config(siamese, SolverKind::LeastSquares, LossKind::Siamese)),
+            training(regularized, config(regularized, SolverKind::Regularized, LossOptions::soft_error())),
+            training(plain, config(plain, SolverKind::LeastSquares, LossOptions::soft_error())),
+            training(siamese, config(siamese, SolverKind::LeastSquares, LossOptions::siamese())),
         ],
         test: Test {
             title: "FAUST registrations",
@@ -204,7 +205,7 @@ fn base(settings: &Settings, name: &str, datasets: &[&Path], paper_steps: u64) -
         pool: 2000,
         validate_every: (steps / 8).max(1),
         validation_pairs: 20,
-        ..TrainConfig::default()
+        ..TrainConfig::paper()
     }
 }
 

@@ -285,7 +285,7 @@ fn export_training(training: &Training) -> Result<(), ReproduceError> {
     let run = &training.config.out;
     let checkpoint = Checkpoint::read(&best_checkpoint(run))?;
     let network = checkpoint.network(&Device::Cpu)?;
-    export(&network, &metadata(&checkpoint, &ModelOrigin::default()), &model_path(run))?;
+    export(network.as_ref(), &metadata(&checkpoint, &ModelOrigin::default()), &model_path(run))?;
     Ok(())
 }
 

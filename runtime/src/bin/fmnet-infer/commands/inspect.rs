@@ -30,10 +30,28 @@ fn inspect_mesh(path: &Path, console: &Console) -> Result<()> {
 
 fn inspect_model(path: &Path, console: &Console) -> Result<()> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let metadata = read_contract(path, &bytes)?;
+    let contract = read_contract(path, &bytes)?;
+    let inputs: Vec<String> = contract
+        .inputs
+        .iter()
+        .map(|input| match input.width {
+            0 => input.quantity.name().to_string(),
+            width => format!("{} ({width})", input.quantity.name()),
+        })
+        .collect();
     let lines: Vec<String> =
-        metadata.to_pairs().iter().map(|(key, value)| format!("  {key}: {value}")).collect();
-    let text = format!("{}: a descriptor network of fmnet\n{}", file_name(path), lines.join("\n"));
-    console.result(&text, json!({ "file": path, "metadata": metadata }));
+        contract.metadata.to_pairs().iter().map(|(key, value)| format!("  {key}: {value}")).collect();
+    let text = format!(
+        "{}: a descriptor network of fmnet\n  from {} to {} descriptors\n{}",
+        file_name(path),
+        inputs.join(", "),
+        contract.outputs,
+        lines.join("\n")
+    );
+    let widths: serde_json::Map<String, serde_json::Value> =
+        contract.inputs.iter().map(|input| (input.quantity.name().to_string(), json!(input.width))).collect();
+    let summary =
+        json!({ "file": path, "metadata": contract.metadata, "inputs": widths, "outputs": contract.outputs });
+    console.result(&text, summary);
     Ok(())
 }

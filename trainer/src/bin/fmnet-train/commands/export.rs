@@ -18,7 +18,7 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
         commit: args.commit.clone(),
     };
     let metadata = metadata(&checkpoint, &origin);
-    export(&checkpoint.network(&Device::Cpu)?, &metadata, &args.output)?;
+    export(checkpoint.network(&Device::Cpu)?.as_ref(), &metadata, &args.output)?;
     if !common.quiet {
         eprintln!("{} -> {} ({} minibatches)", path.display(), args.output.display(), checkpoint.step);
     }

@@ -14,7 +14,7 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
         Some(path) => TrainConfig::read(path)?,
         None => TrainConfig::default(),
     };
-    args.overrides.apply(&mut config);
+    args.overrides.apply(&mut config)?;
     let device = device(args.cuda)?;
     let progress = Progress::new(common);
     let summary = train(&config, &device, &|event| progress.event(event), interrupt::stop())?;

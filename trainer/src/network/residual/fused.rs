@@ -1,8 +1,8 @@
 //! The whole network as one Candle op on the CPU, with a hand-written backward pass.
 
+use super::block::{BlockActivations, BlockContext, BlockParameters};
 use super::norm::{Moments, RowPlan};
 use super::pool::BufferPool;
-use super::residual::{BlockActivations, BlockContext, BlockParameters};
 use super::{Activation, BatchMoments};
 use crate::device::contiguous;
 use crate::numeric::Real;
@@ -10,7 +10,7 @@ use candle_core::{CpuStorage, CustomOp1, Layout, Result, Shape, Tensor, bail};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Where the statistics of a forward pass come from.
-pub(super) enum Statistics {
+pub(super) enum StatisticsOf {
     /// From the rows of each group.
     Groups(Vec<usize>),
     /// Fixed: for `rows` rows, of each block its two normalisations.
@@ -35,7 +35,7 @@ pub(super) struct FusedNetwork<T: Real> {
     /// Between the layers.
     pub(super) activation: Activation,
     /// Where the statistics come from.
-    pub(super) statistics: Statistics,
+    pub(super) statistics: StatisticsOf,
     /// Whether to keep all activations for a backward pass.
     pub(super) train: bool,
     /// Where buffers come from.
@@ -60,8 +60,8 @@ pub(super) fn batch_moments<T>(saved: &SavedActivations<T>) -> Vec<[BatchMoments
 impl<T: Real> FusedNetwork<T> {
     fn plan(&self) -> RowPlan {
         match &self.statistics {
-            Statistics::Groups(groups) => RowPlan::new(groups.clone()),
-            Statistics::Fixed { rows, .. } => RowPlan::new(vec![*rows]),
+            StatisticsOf::Groups(groups) => RowPlan::new(groups.clone()),
+            StatisticsOf::Fixed { rows, .. } => RowPlan::new(vec![*rows]),
         }
     }
 
@@ -89,8 +89,8 @@ impl<T: Real> FusedNetwork<T> {
         let mut saved: Vec<BlockActivations<T>> = Vec::with_capacity(self.blocks);
         for block in 0..self.blocks {
             let fixed = match &self.statistics {
-                Statistics::Groups(_) => None,
-                Statistics::Fixed { blocks, .. } => {
+                StatisticsOf::Groups(_) => None,
+                StatisticsOf::Fixed { blocks, .. } => {
                     Some(blocks[block].each_ref().map(BatchMoments::to_moments))
                 }
             };
@@ -111,7 +111,7 @@ impl<T: Real> FusedNetwork<T> {
 
     fn backward(&self, flat: &[T], grad: &[T]) -> Result<Vec<T>> {
         let mut saved = std::mem::take(&mut *self.saved.lock().unwrap_or_else(PoisonError::into_inner));
-        if saved.len() != self.blocks || matches!(self.statistics, Statistics::Fixed { .. }) {
+        if saved.len() != self.blocks || matches!(self.statistics, StatisticsOf::Fixed { .. }) {
             bail!("the network's backward pass runs once, after a forward pass in training mode");
         }
         let plan = self.plan();

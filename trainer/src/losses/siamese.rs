@@ -1,43 +1,6 @@
-//! Which loss is minimised, and the siamese loss of the paper's comparison.
+//! The siamese loss of the paper's comparison.
 
-use crate::soft_map::ColumnNorm;
 use candle_core::{Result, Tensor};
-use serde::{Deserialize, Serialize};
-
-/// The loss of a training step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "loss", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum LossOptions {
-    /// The soft error of the functional map's soft correspondence (paper, equation "lossf").
-    SoftError {
-        /// Normalisation of the soft map's columns; default l2.
-        #[serde(default)]
-        norm: ColumnNorm,
-    },
-    /// The siamese loss on the descriptors themselves, without a functional map (paper, equation "siam").
-    Siamese {
-        /// Weight of the corresponding pairs against the others; 0 to 1, default 0.5.
-        #[serde(default = "default_gamma")]
-        gamma: f64,
-        /// Distance that pairs which do not correspond should keep; above 0, default 1.
-        #[serde(default = "default_margin")]
-        margin: f64,
-    },
-}
-
-fn default_gamma() -> f64 {
-    0.5
-}
-
-fn default_margin() -> f64 {
-    1.0
-}
-
-impl Default for LossOptions {
-    fn default() -> Self {
-        Self::SoftError { norm: ColumnNorm::L2 }
-    }
-}
 
 /// The siamese loss (Hadsell et al. 2006):
 /// `gamma mean |f - f+|^2 + (1 - gamma) mean max(0, margin - |f - f-|)^2`.

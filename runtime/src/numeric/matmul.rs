@@ -9,7 +9,7 @@ const ROWS_PER_TASK: usize = 128;
 
 /// A matrix `[rows, cols]` in a slice, row-major or the transpose of that.
 #[derive(Clone, Copy)]
-pub(crate) struct MatrixView<'a, T> {
+pub struct MatrixView<'a, T> {
     data: &'a [T],
     rows: usize,
     cols: usize,
@@ -19,13 +19,17 @@ pub(crate) struct MatrixView<'a, T> {
 
 impl<'a, T> MatrixView<'a, T> {
     /// `data` as the rows of a `[rows, cols]` matrix.
-    pub(crate) fn new(data: &'a [T], rows: usize, cols: usize) -> Self {
+    ///
+    /// # Panics
+    /// If there are not `rows * cols` elements.
+    pub fn new(data: &'a [T], rows: usize, cols: usize) -> Self {
         assert_eq!(data.len(), rows * cols, "matrix data does not fit its shape [{rows}, {cols}]");
         Self { data, rows, cols, row_stride: cols, col_stride: 1 }
     }
 
     /// The transpose, without a copy.
-    pub(crate) fn t(self) -> Self {
+    #[must_use]
+    pub fn t(self) -> Self {
         Self {
             rows: self.cols,
             cols: self.rows,
@@ -49,7 +53,10 @@ impl<'a, T> MatrixView<'a, T> {
 }
 
 /// `dst = lhs rhs`, or `dst += lhs rhs` with `accumulate`; `dst` is row-major `[lhs.rows, rhs.cols]`. On one thread.
-pub(crate) fn matmul<T: Real>(dst: &mut [T], accumulate: bool, lhs: MatrixView<T>, rhs: MatrixView<T>) {
+///
+/// # Panics
+/// If the shapes do not fit.
+pub fn matmul<T: Real>(dst: &mut [T], accumulate: bool, lhs: MatrixView<T>, rhs: MatrixView<T>) {
     let (m, n, k) = (lhs.rows, rhs.cols, lhs.cols);
     assert_eq!(k, rhs.rows, "inner dimensions");
     assert_eq!(dst.len(), m * n, "destination [{m}, {n}]");
@@ -70,8 +77,8 @@ pub(crate) fn matmul<T: Real>(dst: &mut [T], accumulate: bool, lhs: MatrixView<T
             rhs.data.as_ptr(),
             rhs.col_stride as isize,
             rhs.row_stride as isize,
-            T::one(),
-            T::one(),
+            T::ONE,
+            T::ONE,
             false,
             false,
             false,
@@ -81,7 +88,10 @@ pub(crate) fn matmul<T: Real>(dst: &mut [T], accumulate: bool, lhs: MatrixView<T
 }
 
 /// `dst = lhs rhs` with the rows of `dst` spread over the threads.
-pub(crate) fn par_matmul<T: Real>(dst: &mut [T], lhs: MatrixView<T>, rhs: MatrixView<T>) {
+///
+/// # Panics
+/// If the shapes do not fit.
+pub fn par_matmul<T: Real>(dst: &mut [T], lhs: MatrixView<T>, rhs: MatrixView<T>) {
     let cols = rhs.cols;
     dst.par_chunks_mut((ROWS_PER_TASK * cols).max(1)).enumerate().for_each(|(task, dst)| {
         let start = task * ROWS_PER_TASK;
@@ -90,13 +100,16 @@ pub(crate) fn par_matmul<T: Real>(dst: &mut [T], lhs: MatrixView<T>, rhs: Matrix
 }
 
 /// `dst = lhs rhs` for a long inner dimension, which is cut into `pieces` whose products are added in order.
-pub(crate) fn matmul_split<T: Real>(dst: &mut [T], lhs: MatrixView<T>, rhs: MatrixView<T>, pieces: usize) {
+///
+/// # Panics
+/// If the shapes do not fit, or there are no pieces.
+pub fn matmul_split<T: Real>(dst: &mut [T], lhs: MatrixView<T>, rhs: MatrixView<T>, pieces: usize) {
     let inner = lhs.cols;
     let bound = |piece: usize| inner * piece / pieces;
     let mut partial = vec![Vec::new(); pieces - 1];
     let mut targets: Vec<&mut [T]> = vec![&mut *dst];
     for part in &mut partial {
-        *part = vec![T::zero(); targets[0].len()];
+        *part = vec![T::ZERO; targets[0].len()];
         targets.push(part);
     }
     targets.par_iter_mut().enumerate().for_each(|(piece, target)| {

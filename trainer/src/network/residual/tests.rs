@@ -2,21 +2,22 @@
 
 use super::*;
 use crate::fm_layer::{FmSolver, functional_map};
+use crate::network::parameter_values;
 use crate::projection::{WeightedBasis, project};
 use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
 use crate::testing::{check_gradient, random};
 use fmnet::fmap::resolvent_mask;
 
-fn options(normalization: Normalization, activation: Activation) -> NetworkOptions {
-    NetworkOptions { blocks: 2, width: 5, normalization, activation, ..NetworkOptions::default() }
+fn options(normalization: Normalization, activation: Activation) -> ResidualOptions {
+    ResidualOptions { blocks: 2, width: 5, normalization, activation, ..ResidualOptions::default() }
 }
 
-fn parameters(options: &NetworkOptions) -> Vec<f64> {
+fn parameters(options: &ResidualOptions) -> Vec<f64> {
     let len = options.blocks * 2 * (options.width * options.width + 2 * options.width);
     random(11, len).iter().map(|value| 0.9 * value + 0.2).collect()
 }
 
-fn fused(options: &NetworkOptions, input: &Tensor, statistics: Statistics) -> FusedNetwork<f64> {
+fn fused(options: &ResidualOptions, input: &Tensor, statistics: StatisticsOf) -> FusedNetwork<f64> {
     FusedNetwork {
         input: input.flatten_all().unwrap().to_vec1().unwrap(),
         width: options.width,
@@ -31,7 +32,7 @@ fn fused(options: &NetworkOptions, input: &Tensor, statistics: Statistics) -> Fu
 }
 
 /// The definition, entry by entry.
-fn naive(options: &NetworkOptions, flat: &[f64], input: &[f64], groups: &[usize]) -> Vec<f64> {
+fn naive(options: &ResidualOptions, flat: &[f64], input: &[f64], groups: &[usize]) -> Vec<f64> {
     let width = options.width;
     let act = |x: f64| match options.activation {
         Activation::Elu if x <= 0.0 => x.exp() - 1.0,
@@ -85,7 +86,7 @@ fn fused_and_composed_forward_passes_equal_the_definition() {
 
             let tensor = Tensor::from_vec(input, (891, options.width), &Device::Cpu).unwrap();
             let flat = Tensor::from_slice(&flat, flat.len(), &Device::Cpu).unwrap();
-            let op = fused(&options, &tensor, Statistics::Groups(groups.clone()));
+            let op = fused(&options, &tensor, StatisticsOf::Groups(groups.clone()));
             let out: Vec<f64> = flat.apply_op1(op).unwrap().flatten_all().unwrap().to_vec1().unwrap();
             assert!(largest_difference(&out, &expected) < 1e-11);
             let out = composed::forward(&options, &flat, &tensor, &groups, None).unwrap().descriptors;
@@ -98,15 +99,13 @@ fn fused_and_composed_forward_passes_equal_the_definition() {
 #[test]
 fn single_precision_network_equals_the_definition() {
     let options = options(Normalization::PerShape, Activation::Elu);
-    let network = Network::new(options.clone(), &Device::Cpu).unwrap();
-    let flat: Vec<f64> = network.parameter_values().unwrap().iter().map(|&v| f64::from(v)).collect();
-    let input = random(5, 40 * options.width);
-    let shape = |start: usize, rows: usize| {
-        let part = &input[start * options.width..(start + rows) * options.width];
-        Tensor::from_slice(part, (rows, options.width), &Device::Cpu).unwrap().to_dtype(DType::F32).unwrap()
-    };
-    let out = network.forward(&[shape(0, 30), shape(30, 10)]).unwrap().to_dtype(DType::F64).unwrap();
-    let out: Vec<f64> = out.flatten_all().unwrap().to_vec1().unwrap();
+    let network = ResidualNetwork::new(options.clone(), 0, &Device::Cpu).unwrap();
+    let flat: Vec<f64> = parameter_values(&network).unwrap().iter().map(|&v| f64::from(v)).collect();
+    let shapes = [input_rows(5, 30, options.width), input_rows(6, 10, options.width)];
+    let out = Tensor::cat(&network.forward(&[&shapes[0], &shapes[1]]).unwrap(), 0).unwrap();
+    let out: Vec<f64> = out.to_dtype(DType::F64).unwrap().flatten_all().unwrap().to_vec1().unwrap();
+    let rows = shapes.iter().flat_map(|shape| shape.features.data());
+    let input: Vec<f64> = rows.map(|&x| f64::from(x)).collect();
     assert!(largest_difference(&out, &naive(&options, &flat, &input, &[30, 10])) < 1e-5);
 }
 
@@ -123,7 +122,7 @@ fn gradients_of_all_parameter_families_equal_central_differences() {
             let flat = Tensor::from_slice(&flat, flat.len(), &Device::Cpu).unwrap();
             let loss = |out: Tensor| (out.sqr()? * &weights)?.sum_all();
             let by_op = |x: &Tensor| {
-                loss(x.apply_op1(fused(&options, &input, Statistics::Groups(groups.clone())))?)
+                loss(x.apply_op1(fused(&options, &input, StatisticsOf::Groups(groups.clone())))?)
             };
             check_gradient(&flat, by_op, 1e-7);
             check_gradient(
@@ -157,9 +156,10 @@ fn gradient_of_the_whole_loss_equals_central_differences() {
             (FmSolver::regularized(), ColumnNorm::L1),
         ] {
             let loss = |x: &Tensor| {
-                let out = x.apply_op1(fused(&options, &input, Statistics::Groups(groups.clone())))?;
-                let spectral = project(&out, bases())?;
-                let (source, target) = (spectral.narrow(0, 0, k)?, spectral.narrow(0, k, k)?);
+                let out = x.apply_op1(fused(&options, &input, StatisticsOf::Groups(groups.clone())))?;
+                let [of_source, of_target] = bases();
+                let source = project(&out.narrow(0, 0, points)?, of_source)?;
+                let target = project(&out.narrow(0, points, points)?, of_target)?;
                 let solved = functional_map(&source, &target, &solver, &mask)?;
                 let error = SoftErrorInput {
                     basis_source: wide(21),
@@ -174,25 +174,35 @@ fn gradient_of_the_whole_loss_equals_central_differences() {
     }
 }
 
+/// Random functions `[rows, width]`.
+fn input_rows(seed: u64, rows: usize, width: usize) -> NetworkInput {
+    let values = random(seed, rows * width).iter().map(|&x| x as f32).collect();
+    NetworkInput { features: fmnet::Matrix::from_vec(rows, width, values), ..NetworkInput::default() }
+}
+
 #[test]
 fn running_statistics_converge_to_those_of_a_repeated_batch() {
-    let options = NetworkOptions { momentum: 0.5, ..options(Normalization::Running, Activation::Elu) };
-    let mut network = Network::new(options, &Device::Cpu).unwrap();
-    let shape =
-        Tensor::from_vec(random(5, 300), (60, 5), &Device::Cpu).unwrap().to_dtype(DType::F32).unwrap();
-    let shapes = [shape.narrow(0, 0, 40).unwrap(), shape.narrow(0, 40, 20).unwrap()];
-    let mut trained = network.forward_train(&shapes).unwrap();
+    let options = ResidualOptions { momentum: 0.5, ..options(Normalization::Running, Activation::Elu) };
+    let mut network = ResidualNetwork::new(options, 0, &Device::Cpu).unwrap();
+    let shapes = [input_rows(5, 40, 5), input_rows(6, 20, 5)];
+    let shapes = [&shapes[0], &shapes[1]];
+    let mut trained = Vec::new();
     for _ in 0..40 {
-        trained = network.forward_train(&shapes).unwrap();
+        let (out, statistics) = network.forward_train(&shapes).unwrap();
+        network.accept(statistics);
+        trained = out;
     }
     let tested = network.forward(&shapes).unwrap();
-    let worst = (trained - tested).unwrap().abs().unwrap().max_all().unwrap().to_scalar::<f32>().unwrap();
-    assert!(worst < 1e-5, "largest difference {worst:e}");
+    for (trained, tested) in trained.iter().zip(&tested) {
+        let worst = (trained - tested).unwrap().abs().unwrap().max_all().unwrap().to_scalar::<f32>().unwrap();
+        assert!(worst < 1e-5, "largest difference {worst:e}");
+    }
 }
 
 #[test]
 fn parameters_are_named_in_the_order_of_the_flat_vector() {
-    let network = Network::new(options(Normalization::PerShape, Activation::Elu), &Device::Cpu).unwrap();
+    let network =
+        ResidualNetwork::new(options(Normalization::PerShape, Activation::Elu), 0, &Device::Cpu).unwrap();
     let infos = network.parameters();
     assert_eq!(infos[0].name, "blocks.0.linear1.weight");
     assert_eq!(infos[11].name, "blocks.1.norm2.shift");
@@ -200,7 +210,7 @@ fn parameters_are_named_in_the_order_of_the_flat_vector() {
         assert_eq!(info.offset, offset);
         offset + info.len()
     });
-    let values = network.parameter_values().unwrap();
+    let values = parameter_values(&network).unwrap();
     assert_eq!(end, values.len());
     let scales = &values[infos[1].offset..infos[1].offset + infos[1].len()];
     assert!(scales.iter().all(|&scale| scale == 1.0));
@@ -208,17 +218,17 @@ fn parameters_are_named_in_the_order_of_the_flat_vector() {
 
 #[test]
 fn threads_and_buffers_do_not_change_the_bits() {
-    let options = NetworkOptions { blocks: 2, width: 48, ..NetworkOptions::default() };
-    let shape = Tensor::from_vec(random(5, 900 * 48), (900, 48), &Device::Cpu).unwrap();
-    let shape = shape.to_dtype(DType::F32).unwrap();
+    let options = ResidualOptions { blocks: 2, width: 48, ..ResidualOptions::default() };
+    let shapes = [input_rows(5, 900, 48), input_rows(6, 500, 48)];
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut network = Network::new(options.clone(), &Device::Cpu).unwrap();
+            let mut network = ResidualNetwork::new(options.clone(), 0, &Device::Cpu).unwrap();
             let mut gradients = Vec::new();
             for _ in 0..2 {
-                let out = network.forward_train(&[shape.clone(), shape.narrow(0, 0, 500).unwrap()]).unwrap();
-                let store = out.sqr().unwrap().sum_all().unwrap().backward().unwrap();
+                let (out, _) = network.forward_train(&[&shapes[0], &shapes[1]]).unwrap();
+                let store =
+                    Tensor::cat(&out, 0).unwrap().sqr().unwrap().sum_all().unwrap().backward().unwrap();
                 gradients.push(store.get(network.variable()).unwrap().to_vec1::<f32>().unwrap());
             }
             gradients

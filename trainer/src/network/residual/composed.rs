@@ -1,6 +1,6 @@
 //! The network from Candle's own ops: for devices other than the CPU, and to check the fused op against.
 
-use super::{Activation, BatchMoments, NetworkOptions};
+use super::{Activation, BatchMoments, ResidualOptions};
 use candle_core::{D, Result, Tensor};
 
 /// What a forward pass gives: descriptors of all rows `[n, width]`, and of each block the moments of its two
@@ -15,7 +15,7 @@ pub(super) struct Composed {
 /// Runs the network with `parameters` (flat) over `input` `[n, width]`, whose rows form `groups` unless `fixed` gives the
 /// moments.
 pub(super) fn forward(
-    options: &NetworkOptions,
+    options: &ResidualOptions,
     parameters: &Tensor,
     input: &Tensor,
     groups: &[usize],
