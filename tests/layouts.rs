@@ -8,7 +8,10 @@ use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};
 use fmnet_trainer::config::{List, Sampling, TrainConfig};
 use fmnet_trainer::dataset::{Dataset, Split};
 use fmnet_trainer::events::TrainEvent;
-use fmnet_trainer::simulate::{PartKind, PartOptions, ScanOptions, cut_part, write_parts, write_scans};
+use fmnet_trainer::simulate::{
+    PartKind, PartOptions, ScanOptions, TriangulationOptions, cut_part, write_parts, write_scans,
+    write_triangulations,
+};
 use fmnet_trainer::train::{METRICS, PLOT, TrainError, train};
 use std::fmt::Write;
 use std::fs;
@@ -84,6 +87,23 @@ fn scans_train_with_jitter_and_holes() {
     write_scans(&dataset, &[Split::Train, Split::Validation], &out, &options, &|_, _, _| {}).unwrap();
     let config = TrainConfig { jitter: 4, sampling: Sampling::Area, decimate: 1000, ..config(&out) };
     assert_eq!(run(&config).1.len(), 2);
+}
+
+#[test]
+fn triangulations_train_by_points_on_the_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    poses(folder.path(), &["tr_reg_000.ply", "tr_reg_001.ply", "tr_reg_060.ply", "tr_reg_061.ply"]);
+    let out = folder.path().join("simulated");
+    let options = TriangulationOptions {
+        min_vertices: 700,
+        typical_vertices: 800,
+        max_vertices: 900,
+        ..TriangulationOptions::default()
+    };
+    let splits = [Split::Train, Split::Validation];
+    let dataset = Dataset::open(folder.path()).unwrap();
+    write_triangulations(&dataset, &splits, &out, &options, &|_, _, _| {}).unwrap();
+    assert_eq!(run(&config(&out)).1.len(), 2);
 }
 
 #[test]

@@ -192,7 +192,7 @@ fn every_option_that_a_page_names_exists() {
     for command in ["synth", "preprocess", "train", "export", "evaluate", "reproduce", "simulate"] {
         known.extend(help(train(), &[command, "--help"]));
     }
-    for kind in ["parts", "scans"] {
+    for kind in ["parts", "scans", "triangulations"] {
         known.extend(help(train(), &["simulate", kind, "--help"]));
     }
     // Of cargo, its test harness and the scripts.

@@ -6,10 +6,10 @@ use fmnet::cache::{Cache, Lookup};
 use fmnet::descriptor::ShotOptions;
 use fmnet::events::ignore;
 use fmnet::io::{
-    Attributes, Joint, Skin, Texture, decode_mesh, read_matrix, read_point_map, read_vector, write_matrix,
-    write_mesh, write_point_map,
+    Attributes, Joint, Skin, Texture, decode_mesh, read_matrix, read_point_map, read_surface_points,
+    read_vector, write_matrix, write_mesh, write_point_map, write_surface_points,
 };
-use fmnet::mesh::inspect;
+use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
 use fmnet::network::contract::ModelInput;
 use fmnet::network::{Backend, DescriptorNetwork};
@@ -31,7 +31,7 @@ use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
 /// Every target.
-pub(super) const NAMES: [&str; 19] = [
+pub(super) const NAMES: [&str; 20] = [
     "off",
     "ply",
     "obj",
@@ -48,6 +48,7 @@ pub(super) const NAMES: [&str; 19] = [
     "model",
     "dataset.toml",
     "baryc_gt",
+    "corr",
     "config.toml",
     "checkpoint",
     "cache",
@@ -98,6 +99,7 @@ pub(super) fn make(name: &str, folder: &Path) -> Target {
         "model" => models(),
         "dataset.toml" => manifests(folder),
         "baryc_gt" => barycentric(folder),
+        "corr" => surface_points(folder),
         "config.toml" => configs(folder),
         "checkpoint" => checkpoints(folder),
         "cache" => cache_entries(folder),
@@ -317,6 +319,16 @@ fn manifests(folder: &Path) -> Target {
         let Ok(dataset) = Dataset::open(&folder) else { return false };
         let read = |shape: &ShapeEntry| shape.read().and_then(|mesh| shape.points(&mesh)).is_ok();
         dataset.shapes.iter().all(read)
+    })
+}
+
+fn surface_points(folder: &Path) -> Target {
+    let path = folder.join("part.corr");
+    let points = [Some(SurfacePoint { face: 2, weights: [0.25, 0.5, 0.25] }), None];
+    write_surface_points(&path, &points).unwrap();
+    Target::new(vec![std::fs::read(&path).unwrap()], move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        read_surface_points(&path, 8).is_ok()
     })
 }
 

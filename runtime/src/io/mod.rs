@@ -3,6 +3,7 @@
 //! - [`read_mesh`] / [`write_mesh`]: OFF, PLY, OBJ, glTF / GLB and STL (reading only), with what they carry
 //!   besides the triangles: colours, texture coordinates, scalar fields, skin weights ([`Attributes`]).
 //! - [`read_point_map`] / [`write_point_map`]: `.txt`, `.vts`, `.npy`, `.csv`.
+//! - [`read_surface_points`] / [`write_surface_points`]: `.corr`, points that need not be vertices.
 //! - [`read_matrix`] / [`write_matrix`], [`read_vector`] / [`write_vector`]: NumPy's `.npy`.
 //! - [`write_atomically`]: what every writer here goes through.
 //!
@@ -32,6 +33,7 @@ mod off;
 mod ply;
 mod point_map;
 mod stl;
+mod surface_points;
 mod text;
 
 use std::path::Path;
@@ -42,6 +44,7 @@ pub use error::{IoError, Position};
 pub use format::MeshFormat;
 pub use matrix::{NpyNumber, read_matrix, read_vector, write_matrix, write_vector};
 pub use point_map::{PointMapFormat, read_point_map, write_point_map};
+pub use surface_points::{read_surface_points, write_surface_points};
 
 use crate::Mesh;
 use error::Parsed;

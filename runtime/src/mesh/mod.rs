@@ -1,23 +1,29 @@
 //! Triangle meshes: the type, what can be wrong with one, its repair and its reduction.
 
+mod closest_point;
 mod decimate;
 mod geometry;
 mod nearest;
 mod repair;
 mod sampling;
 pub mod shapes;
+mod surface_point;
 #[cfg(test)]
 mod test_data;
 mod topology;
+mod triangle;
 mod union_find;
 mod validate;
 pub mod vec3;
 
+pub use closest_point::{ClosestPoint, carried_points, closest_points};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use nearest::{nearest_k_vertices, nearest_vertices};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
 pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
+pub use surface_point::{SurfacePoint, vertices_on_surface};
 pub use topology::{Adjacency, Components, Fans, NONE, Topology};
+pub use triangle::closest_weights;
 pub(crate) use union_find::UnionFind;
 pub use validate::{ComponentSize, Found, MeshReport, inspect};
 

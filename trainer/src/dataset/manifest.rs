@@ -7,12 +7,14 @@
 //! mesh = "horse/horse_03.ply"            # relative to the manifest
 //! group = "horse"                        # shapes of one group correspond with each other
 //! correspondence = "horse/horse_03.vts"  # line i: 1-based vertex of point i, 0 where missing; absent: vertex i is point i
+//!                                        # a .corr file: line i: 1-based triangle of point i and three weights, -1 where missing
 //! split = "train"                        # train | validation | test
 //! partial = false                        # a part of a whole: a source only
 //! ```
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split};
-use serde::Deserialize;
+use fmnet::io::write_atomically;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub const FILE_NAME: &str = "dataset.toml";
 const FORMAT: u32 = 1;
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
     format: u32,
@@ -28,16 +30,48 @@ struct Manifest {
     shape: Vec<ManifestShape>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct ManifestShape {
     name: String,
     mesh: String,
     group: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     correspondence: Option<String>,
     split: Split,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     partial: bool,
+}
+
+/// Writes the manifest of shapes whose files are in `folder`. Their correspondences are files, or by vertices.
+///
+/// # Errors
+/// If a file is not in the folder, a correspondence is of another kind, or the manifest cannot be written.
+pub(crate) fn write(folder: &Path, shapes: &[ShapeEntry]) -> Result<(), DatasetError> {
+    let path = folder.join(FILE_NAME);
+    let wrong = |reason: String| DatasetError::Manifest { path: path.clone(), reason };
+    let relative = |file: &Path| match file.strip_prefix(folder).map(Path::to_str) {
+        Ok(Some(inner)) => Ok(inner.replace(std::path::MAIN_SEPARATOR, "/")),
+        _ => Err(wrong(format!("{} is not in its folder, or its name is not UTF-8", file.display()))),
+    };
+    let entry = |shape: &ShapeEntry| {
+        let correspondence = match &shape.correspondence {
+            Correspondence::Identity => None,
+            Correspondence::Vts(file) | Correspondence::Surface(file) => Some(relative(file)?),
+            other => return Err(wrong(format!("{}: {other:?} has no place in a manifest", shape.name))),
+        };
+        Ok(ManifestShape {
+            name: shape.name.clone(),
+            mesh: relative(&shape.mesh)?,
+            group: shape.group.clone(),
+            correspondence,
+            split: shape.split,
+            partial: shape.is_part(),
+        })
+    };
+    let shape = shapes.iter().map(entry).collect::<Result<_, DatasetError>>()?;
+    let text = toml::to_string(&Manifest { format: FORMAT, shape }).map_err(|e| wrong(e.to_string()))?;
+    Ok(write_atomically(&path, |file| file.write_all(text.as_bytes()))?)
 }
 
 /// Reads a manifest; paths are relative to its folder.
@@ -63,6 +97,9 @@ pub(super) fn read(path: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
             return Err(wrong(format!("two shapes are named {:?}; names must differ", shape.name)));
         }
         let correspondence = match shape.correspondence {
+            Some(file) if Path::new(&file).extension().is_some_and(|e| e.eq_ignore_ascii_case("corr")) => {
+                Correspondence::Surface(folder.join(file))
+            }
             Some(file) => Correspondence::Vts(folder.join(file)),
             None => Correspondence::Identity,
         };

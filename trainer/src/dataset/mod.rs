@@ -12,8 +12,8 @@ pub(crate) use layouts::{faust_numbers, mesh_files};
 pub(crate) use shrec16::TRAINING_PARTS;
 
 use fmnet::Mesh;
-use fmnet::io::{IoError, read_mesh, read_point_map};
-use fmnet::mesh::vec3;
+use fmnet::io::{IoError, read_mesh, read_point_map, read_surface_points};
+use fmnet::mesh::{SurfacePoint, closest_points, vec3, vertices_on_surface};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -39,6 +39,8 @@ pub enum Correspondence {
     First(usize),
     /// Line `i` of a `.vts` file holds the 1-based vertex of point `i`, 0 where the shape lacks it.
     Vts(PathBuf),
+    /// Line `i` of a `.corr` file holds the 1-based triangle of point `i` and its three weights, -1 where the shape lacks it.
+    Surface(PathBuf),
     /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place; the shape lacks
     /// it where none is within 0.02 sqrt(area), or an edge of a coarse scan, as in a hole.
     NearestTo(PathBuf),
@@ -180,6 +182,10 @@ impl ShapeEntry {
                 reason: format!("{n} vertices, but the first {count} should correspond"),
             }),
             Correspondence::Vts(path) => vts_points(path, n),
+            Correspondence::Surface(path) => {
+                let points = read_surface_points(path, mesh.n_faces())?;
+                Ok(points.iter().map(|p| p.map_or(MISSING, |p| p.nearest_vertex(mesh))).collect())
+            }
             Correspondence::NearestTo(path) => {
                 let template = read_mesh(path)?.mesh;
                 if mesh.n_vertices() == 0 {
@@ -190,15 +196,49 @@ impl ShapeEntry {
             Correspondence::Barycentric(path, whole) => shrec16::points(path, whole, n),
         }
     }
+
+    /// Where on `mesh`, as read, every point of the group lies, `[points]`, `None` where the shape lacks it. A point that is a
+    /// vertex of no triangle is on no surface, so it is `None` as well.
+    ///
+    /// [`fmnet::mesh::carried_points`] takes them to the repaired and the decimated mesh, whose triangles are others: each to
+    /// the closest point of the same skin.
+    ///
+    /// # Errors
+    /// If the correspondence cannot be read or does not fit the mesh.
+    pub fn surface_points(&self, mesh: &Mesh) -> Result<Vec<Option<SurfacePoint>>, DatasetError> {
+        match &self.correspondence {
+            Correspondence::Surface(path) => Ok(read_surface_points(path, mesh.n_faces())?),
+            Correspondence::NearestTo(path) => Ok(closest_on_scan(mesh, &read_mesh(path)?.mesh)),
+            _ => {
+                let on_surface = vertices_on_surface(mesh);
+                let place = |&v: &u32| on_surface.get(v as usize).copied().flatten();
+                Ok(self.points(mesh)?.iter().map(place).collect())
+            }
+        }
+    }
 }
 
 /// Vertices of a scan farther than this from a vertex of its registration do not show it, relative to sqrt(area).
 const NEAR: f64 = 0.02;
 
-fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
+/// How far from the template the nearest vertex of a scan may be, in its unit.
+fn near(mesh: &Mesh, template: &Mesh) -> f64 {
     // An even triangulation of n vertices has edges of about sqrt(area / n).
     let edge = 1.0 / (mesh.n_vertices() as f64).sqrt();
-    let limit = NEAR.max(edge) * template.scale();
+    NEAR.max(edge) * template.scale()
+}
+
+/// The points of the scan closest to the template's vertices, where one is near.
+fn closest_on_scan(mesh: &Mesh, template: &Mesh) -> Vec<Option<SurfacePoint>> {
+    let limit = near(mesh, template);
+    let near = |(&p, point): (&[f64; 3], Option<SurfacePoint>)| {
+        point.filter(|point| vec3::distance(p, point.position(mesh)) <= limit)
+    };
+    template.vertices().iter().zip(closest_points(mesh, template.vertices())).map(near).collect()
+}
+
+fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
+    let limit = near(mesh, template);
     let nearest = fmnet::mesh::nearest_vertices(mesh.vertices(), template.vertices());
     let near = |(&p, v): (&[f64; 3], u32)| match vec3::distance(p, mesh.vertices()[v as usize]) <= limit {
         true => v,

@@ -4,7 +4,7 @@
 
 use super::layouts::{mesh_files, stem};
 use super::{Correspondence, DatasetError, MISSING, ShapeEntry, Split};
-use fmnet::io::read_mesh;
+use fmnet::io::{read_mesh, read_surface_points};
 use std::path::Path;
 
 /// Parts at the beginning of the list are for training, as in the paper's experiment.
@@ -55,47 +55,21 @@ fn number(name: &str) -> Option<u64> {
 /// [`MISSING`].
 pub(super) fn points(ground_truth: &Path, whole: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
     let whole = read_mesh(whole)?.mesh;
-    let text = std::fs::read_to_string(ground_truth)
-        .map_err(|source| DatasetError::Folder { path: ground_truth.to_path_buf(), source })?;
-    let wrong = |reason| DatasetError::Correspondence { path: ground_truth.to_path_buf(), reason };
+    let on_whole = read_surface_points(ground_truth, whole.n_faces())?;
+    if on_whole.len() != n {
+        let reason =
+            format!("{} lines, but the part has {n} vertices; expected a line for each", on_whole.len());
+        return Err(DatasetError::Correspondence { path: ground_truth.to_path_buf(), reason });
+    }
     let mut points = vec![MISSING; whole.n_vertices()];
     let mut best = vec![0.0; whole.n_vertices()];
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let mut count = 0;
-    for (vertex, (number, line)) in lines.enumerate() {
-        let (face, weights) =
-            parse(line, whole.n_faces()).map_err(|reason| wrong(format!("line {}: {reason}", number + 1)))?;
-        let heaviest = (0..3).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(0);
-        let corner = whole.faces()[face][heaviest] as usize;
-        if weights[heaviest] > best[corner] {
-            best[corner] = weights[heaviest];
+    for (vertex, point) in on_whole.iter().enumerate().filter_map(|(v, point)| Some((v, (*point)?))) {
+        let corner = point.nearest_vertex(&whole) as usize;
+        let weight = point.weights.into_iter().fold(0.0, f64::max);
+        if weight > best[corner] {
+            best[corner] = weight;
             points[corner] = vertex as u32;
         }
-        count += 1;
     }
-    match count == n {
-        true => Ok(points),
-        false => {
-            Err(wrong(format!("{count} lines, but the part has {n} vertices; expected a line for each")))
-        }
-    }
-}
-
-/// The 0-based triangle and the weights of a line.
-fn parse(line: &str, n_faces: usize) -> Result<(usize, [f64; 3]), String> {
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let [face, weights @ ..] = words.as_slice() else { return Err("empty".into()) };
-    let &[a, b, c] = weights else {
-        return Err(format!("{} numbers; expected a triangle and three barycentric weights", words.len()));
-    };
-    let number = |word: &str| match word.parse::<f64>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("{word:?} is no number")),
-    };
-    // MATLAB may have written the index as a float.
-    let index = number(face)?;
-    if index.fract() != 0.0 || index < 1.0 || index > n_faces as f64 {
-        return Err(format!("triangle {face}, but the whole shape has triangles 1 to {n_faces}"));
-    }
-    Ok((index as usize - 1, [number(a)?, number(b)?, number(c)?]))
+    Ok(points)
 }

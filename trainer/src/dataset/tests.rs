@@ -53,16 +53,15 @@ fn barycentric_ground_truth_gives_the_nearest_vertex() {
 fn wrong_ground_truth_is_named_by_file_and_line() {
     let good = "1 0 0 1\n2 0 1 0\n1 0 1 0\n";
     for (line, reason) in [
-        ("5 1 0 0", "line 4: triangle 5, but the whole shape has triangles 1 to 4"),
+        ("5 1 0 0", "line 4: triangle 5, but the mesh has triangles 1 to 4"),
         ("0 1 0 0", "line 4: triangle 0,"),
-        ("1.5 1 0 0", "line 4: triangle 1.5,"),
-        ("1 1 0", "line 4: 3 numbers; expected a triangle and three"),
-        ("1 1 x 0", "line 4: \"x\" is no number"),
-        ("1 1 NaN 0", "line 4: \"NaN\" is no number"),
+        ("1.5 1 0 0", "line 4: the triangle is not an integer"),
+        ("1 1 0", "line 4: a barycentric weight is missing"),
+        ("1 1 x 0", "line 4: a barycentric weight is not a number: 'x'"),
         ("", "3 lines, but the part has 4 vertices"),
     ] {
         let error = with_truth(&format!("{good}{line}\n")).unwrap_err().to_string();
-        assert!(error.contains("holes_cat_shape_1.baryc_gt: ") && error.contains(reason), "{error}");
+        assert!(error.contains("holes_cat_shape_1.baryc_gt") && error.contains(reason), "{error}");
     }
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), &[("null/cat.off", WHOLE), ("cuts/cuts_cat_shape_1.off", PART)]);
@@ -165,4 +164,79 @@ fn a_wrong_manifest_is_named() {
         let error = Dataset::open(folder.path()).unwrap_err().to_string();
         assert!(error.contains("dataset.toml") && error.contains(reason), "{error}");
     }
+}
+
+/// A folder with the pyramid and the `.corr` file given.
+fn with_surface_points(text: &str) -> (tempfile::TempDir, Dataset) {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = "format = 1\n[[shape]]\nname = \"a\"\nmesh = \"a.off\"\ngroup = \"g\"\n\
+                    correspondence = \"a.CORR\"\nsplit = \"train\"\n";
+    write(folder.path(), &[("a.off", WHOLE), ("a.CORR", text), ("dataset.toml", manifest)]);
+    let dataset = Dataset::open(folder.path()).unwrap();
+    (folder, dataset)
+}
+
+#[test]
+fn surface_points_give_positions_and_the_heaviest_vertex() {
+    let (_folder, dataset) = with_surface_points("2 0.5 0.25 0.25\n-1 0 0 0\n4 0.1 0.2 0.7\n");
+    let entry = &dataset.shapes[0];
+    assert_eq!(points(entry).unwrap(), [1, MISSING, 4]);
+    let mesh = entry.read().unwrap();
+    let surface = entry.surface_points(&mesh).unwrap();
+    assert_eq!(surface[0].unwrap().position(&mesh), [0.875, 0.375, 0.25]);
+    assert!(surface[1].is_none() && surface[2].unwrap().face == 3);
+
+    let (_folder, dataset) = with_surface_points("2 0.5 0.25 0.25\n5 1 0 0\n");
+    for error in [
+        points(&dataset.shapes[0]).unwrap_err(),
+        dataset.shapes[0].surface_points(&mesh).unwrap_err(),
+    ] {
+        let error = error.to_string();
+        assert!(error.contains("a.CORR, line 2: triangle 5"), "{error}");
+    }
+}
+
+#[test]
+fn every_correspondence_gives_points_on_the_surface() {
+    let mesh = icosphere(2);
+    let folder = tempfile::tempdir().unwrap();
+    let registration = folder.path().join("registration.off");
+    write_mesh(&registration, &mesh, &Attributes::default()).unwrap();
+    write(folder.path(), &[("a.vts", "7\n0\n3\n")]);
+    let with = |correspondence| ShapeEntry {
+        name: "a".into(),
+        mesh: registration.clone(),
+        group: "g".into(),
+        correspondence,
+        split: Split::Train,
+        whole: None,
+    };
+    for correspondence in [
+        Correspondence::Identity,
+        Correspondence::First(5),
+        Correspondence::Vts(folder.path().join("a.vts")),
+        Correspondence::NearestTo(registration.clone()),
+    ] {
+        let entry = with(correspondence);
+        let (vertices, points) = (entry.points(&mesh).unwrap(), entry.surface_points(&mesh).unwrap());
+        assert_eq!(vertices.len(), points.len());
+        for (&vertex, point) in vertices.iter().zip(points) {
+            match point {
+                None => assert_eq!(vertex, MISSING),
+                Some(point) => assert_eq!(point.position(&mesh), mesh.vertices()[vertex as usize]),
+            }
+        }
+    }
+    // A scan that is turned against its registration by a fraction of an edge: its surface is nearer than its vertices.
+    let scan = transformed(&mesh, fmnet::mesh::shapes::rotation([0.0, 0.0, 1.0], 0.1), 1.0, [0.0; 3]);
+    let points = with(Correspondence::NearestTo(registration.clone())).surface_points(&scan).unwrap();
+    for (&p, point) in mesh.vertices().iter().zip(points) {
+        let distance = fmnet::mesh::vec3::distance(p, point.unwrap().position(&scan));
+        assert!(distance < 0.03, "{distance}");
+    }
+    // A vertex of no triangle is on no surface.
+    let (_folder, dataset) = with_surface_points("");
+    let lone = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0; 3]], vec![[0, 1, 2]]).unwrap();
+    let identity = ShapeEntry { correspondence: Correspondence::Identity, ..dataset.shapes[0].clone() };
+    assert_eq!(identity.surface_points(&lone).unwrap()[3], None);
 }

@@ -4,8 +4,10 @@
 //!   layout of the FAUST scans.
 //! - [`cut_part`] cuts a part out of a shape; [`write_parts`] a folder in the layout of the SHREC'16 partial correspondence
 //!   benchmark (Cosmo et al. 2016).
+//! - [`triangulated`] gives a shape another triangulation, with correspondences that are points on its surface;
+//!   [`write_triangulations`] a folder with a manifest.
 //!
-//! Both folders are read by [`Dataset::open`](crate::dataset::Dataset::open) like the real ones. The same options and seed give
+//! All folders are read by [`Dataset::open`](crate::dataset::Dataset::open) like the real ones. The same options and seed give
 //! the same files. An interrupted run goes on where it was: files are there in full or not at all, and those that are there
 //! are left alone.
 
@@ -20,12 +22,14 @@ mod scan_files;
 mod smooth;
 #[cfg(test)]
 mod tests;
+mod triangulation;
+mod triangulation_files;
 mod visibility;
 mod volume;
 
 use crate::dataset::DatasetError;
 use fmnet::io::IoError;
-use fmnet::mesh::DecimateError;
+use fmnet::mesh::{DecimateError, RepairError};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -33,6 +37,8 @@ pub use part::{Part, PartKind, PartOptions, cut_part};
 pub use part_files::write_parts;
 pub use scan::{Axis, ScanOptions, simulate_scan};
 pub use scan_files::write_scans;
+pub use triangulation::{Manner, Plan, Triangulated, TriangulationOptions, triangulated};
+pub use triangulation_files::write_triangulations;
 
 /// Told after each shape how many of how many are there, and the name of its file.
 pub type SimulateProgress<'a> = &'a (dyn Fn(usize, usize, &str) + Sync);
@@ -100,6 +106,9 @@ pub enum SimulateError {
     /// The dataset's files are wrong.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// The shape cannot be made a manifold.
+    #[error(transparent)]
+    Repair(#[from] RepairError),
     /// The dense surface could not be reduced.
     #[error(transparent)]
     Decimate(#[from] DecimateError),

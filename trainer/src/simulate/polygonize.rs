@@ -1,20 +1,20 @@
-//! Level sets of a sampled function as triangles, by marching tetrahedra (Doi and Koide 1991): each cube of the grid in six
-//! tetrahedra around its diagonal, which fit together across cubes, so that the surface is always a closed manifold.
+//! Level sets of a sampled function as triangles, by marching cubes (Lorensen and Cline 1987). Where a face of a cube is crossed
+//! four times its inside corners are taken to be apart, in both cubes that share it, so that the surface is always a closed
+//! manifold.
 
 use super::volume::Volume;
 use fmnet::Mesh;
+use fmnet::mesh::vec3;
 use std::collections::HashMap;
 
-/// Corners of the tetrahedra of a cube, positively oriented; bit `a` of a corner is its step along axis `a`.
-const TETRAHEDRA: [[usize; 4]; 6] =
-    [[0, 1, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 3, 2, 7], [0, 6, 4, 7], [0, 5, 1, 7]];
-/// The even orders of four corners that bring each of them to the front.
-const FRONT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]];
-/// The even orders of four corners by the two in front.
-const PAIRS: [[usize; 4]; 6] =
-    [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
+/// Corners of the faces of a cube, counter-clockwise from outside; bit `a` of a corner is its step along axis `a`.
+const FACES: [[usize; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 /// Vertices keep away from the nodes by this share of an edge, so that no triangle vanishes.
 const MARGIN: f32 = 0.05;
+
+/// An edge of a cube by its two corners, the lower one first.
+type Edge = [usize; 2];
 
 /// The surface of `value = level`, its faces looking to larger values.
 pub(super) fn polygonize(volume: &Volume, level: f32) -> Mesh {
@@ -26,15 +26,20 @@ pub(super) fn polygonize(volume: &Volume, level: f32) -> Mesh {
 
 /// Points of the level set, closer together than the grid.
 pub(super) fn crossings(volume: &Volume, level: f32) -> Vec<[f64; 3]> {
-    polygonize(volume, level).vertices().to_vec()
+    let mesh = polygonize(volume, level);
+    let centroid = |f: usize| {
+        let [a, b, c] = mesh.corners(f);
+        vec3::scale(vec3::add(a, vec3::add(b, c)), 1.0 / 3.0)
+    };
+    mesh.vertices().iter().copied().chain((0..mesh.n_faces()).map(centroid)).collect()
 }
 
 struct Surface<'a> {
     volume: &'a Volume,
     level: f32,
     vertices: Vec<[f64; 3]>,
-    /// The vertex on each edge of the tetrahedra that crosses the level, by its two nodes, the lower one first.
-    of_edge: HashMap<(usize, usize), u32>,
+    /// The vertex on each edge of the grid that crosses the level, by its two nodes, the lower one first.
+    of_edge: HashMap<[usize; 2], u32>,
     faces: Vec<[u32; 3]>,
 }
 
@@ -43,42 +48,45 @@ impl Surface<'_> {
         let [nx, ny, nz] = self.volume.size;
         let step = |corner: usize| ((corner & 1) * ny + (corner >> 1 & 1)) * nz + (corner >> 2);
         let steps: [usize; 8] = std::array::from_fn(step);
+        // Which corners are inside tells the polygons; most of the 256 cases come again and again.
+        let mut polygons_of: Vec<Option<Vec<Vec<Edge>>>> = vec![None; 256];
         for i in 0..nx - 1 {
             for j in 0..ny - 1 {
                 for k in 0..nz - 1 {
                     let node = (i * ny + j) * nz + k;
                     let inside = steps.map(|s| self.volume.values[node + s] < self.level);
-                    if inside.iter().any(|&x| x != inside[0]) {
-                        for corners in TETRAHEDRA {
-                            self.tetrahedron(corners.map(|c| node + steps[c]), corners.map(|c| inside[c]));
-                        }
+                    let case = (0..8).fold(0, |case, corner| case | usize::from(inside[corner]) << corner);
+                    if case == 0 || case == 255 {
+                        continue;
+                    }
+                    for polygon in polygons_of[case].get_or_insert_with(|| polygons(inside)) {
+                        self.polygon(polygon, |corner| node + steps[corner]);
                     }
                 }
             }
         }
     }
 
-    fn tetrahedron(&mut self, nodes: [usize; 4], inside: [bool; 4]) {
-        match inside.iter().filter(|&&x| x).count() {
-            count @ (1 | 3) => {
-                let single = (0..4).find(|&i| inside[i] == (count == 1)).expect("one differs");
-                let [a, b, c, d] = FRONT[single].map(|i| nodes[i]);
-                let face = [self.vertex(a, b), self.vertex(a, c), self.vertex(a, d)];
-                self.faces.push(if count == 1 { face } else { [face[0], face[2], face[1]] });
+    fn polygon(&mut self, polygon: &[Edge], node: impl Fn(usize) -> usize) {
+        let corners: Vec<u32> = polygon.iter().map(|edge| self.vertex(edge.map(&node))).collect();
+        let n = corners.len();
+        // A diagonal within a face of the cube might be an edge of the neighbouring cube as well.
+        let apart = |i: usize, j: usize| !share_face(polygon[i % n], polygon[j % n]);
+        match (0..n).find(|&apex| (2..n - 1).all(|j| apart(apex, apex + j))) {
+            Some(apex) => self.faces.extend(
+                (1..n - 1).map(|j| [corners[apex], corners[(apex + j) % n], corners[(apex + j + 1) % n]]),
+            ),
+            None => {
+                let sum = corners.iter().fold([0.0; 3], |sum, &i| vec3::add(sum, self.vertices[i as usize]));
+                let center = self.vertices.len() as u32;
+                self.vertices.push(vec3::scale(sum, 1.0 / n as f64));
+                self.faces.extend((0..n).map(|j| [center, corners[j], corners[(j + 1) % n]]));
             }
-            2 => {
-                let order = PAIRS.into_iter().find(|o| inside[o[0]] && inside[o[1]]).expect("two are inside");
-                let [a, b, c, d] = order.map(|i| nodes[i]);
-                let quad = [self.vertex(a, c), self.vertex(a, d), self.vertex(b, d), self.vertex(b, c)];
-                self.faces.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
-            }
-            _ => {}
         }
     }
 
-    fn vertex(&mut self, a: usize, b: usize) -> u32 {
-        let (a, b) = (a.min(b), a.max(b));
-        if let Some(&vertex) = self.of_edge.get(&(a, b)) {
+    fn vertex(&mut self, [a, b]: [usize; 2]) -> u32 {
+        if let Some(&vertex) = self.of_edge.get(&[a, b]) {
             return vertex;
         }
         let [from, to] = [a, b].map(|node| self.volume.values[node]);
@@ -89,9 +97,43 @@ impl Surface<'_> {
         });
         let vertex = self.vertices.len() as u32;
         self.vertices.push(std::array::from_fn(|axis| p[axis] + t * (q[axis] - p[axis])));
-        self.of_edge.insert((a, b), vertex);
+        self.of_edge.insert([a, b], vertex);
         vertex
     }
+}
+
+/// The polygons in which the surface crosses a cube, each as the edges of the cube that it crosses, counter-clockwise from outside.
+fn polygons(inside: [bool; 8]) -> Vec<Vec<Edge>> {
+    // Around a face each edge by which one comes in is followed by one by which one leaves again; the inside corners between them
+    // are cut off by the line from the one to the other. Every crossed edge is come in by in one of its two faces.
+    let mut next: Vec<(Edge, Edge)> = Vec::new();
+    for face in FACES {
+        let crossed: Vec<(Edge, bool)> = (0..4)
+            .map(|k| [face[k], face[(k + 1) % 4]])
+            .filter(|&[from, to]| inside[from] != inside[to])
+            .map(|[from, to]| ([from.min(to), from.max(to)], inside[to]))
+            .collect();
+        for (k, (edge, _)) in crossed.iter().enumerate().filter(|(_, (_, enters))| *enters) {
+            next.push((*edge, crossed[(k + 1) % crossed.len()].0));
+        }
+    }
+    let mut polygons = Vec::new();
+    while let Some((first, mut edge)) = next.pop() {
+        let mut polygon = vec![first];
+        while edge != first {
+            polygon.push(edge);
+            let Some(place) = next.iter().position(|(from, _)| *from == edge) else { break };
+            edge = next.swap_remove(place).1;
+        }
+        polygons.push(polygon);
+    }
+    polygons
+}
+
+/// Whether two edges lie in one face of the cube.
+fn share_face(a: Edge, b: Edge) -> bool {
+    let corners = [a[0], a[1], b[0], b[1]];
+    (0..3).any(|axis| corners.iter().all(|c| (c ^ corners[0]) >> axis & 1 == 0))
 }
 
 #[cfg(test)]
@@ -99,6 +141,39 @@ mod tests {
     use super::*;
     use fmnet::mesh::shapes::torus;
     use fmnet::mesh::{Topology, vec3};
+
+    #[test]
+    fn every_case_of_a_cube_is_a_surface() {
+        for case in 1..255 {
+            let inside: [bool; 8] = std::array::from_fn(|corner| case >> corner & 1 == 1);
+            let mut crossed: Vec<Edge> = polygons(inside).concat();
+            crossed.sort_unstable();
+            let mut expected: Vec<Edge> = (0..8)
+                .flat_map(|a| [1, 2, 4].map(|step| [a, a | step]))
+                .filter(|[a, b]| a != b && inside[*a] != inside[*b])
+                .collect();
+            expected.sort_unstable();
+            assert_eq!(crossed, expected, "case {case}: every crossed edge is in one polygon");
+        }
+    }
+
+    /// Random values in a box that is outside all around: every case beside every other.
+    #[test]
+    fn noise_makes_a_closed_manifold() {
+        let mut volume = Volume::new(&torus(12, 6, 0.4), 0.15, 0.2);
+        let [nx, ny, nz] = volume.size;
+        let mut state = 1u32;
+        for (at, value) in volume.values.iter_mut().enumerate() {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let [i, j, k] = [at / (ny * nz), at / nz % ny, at % nz];
+            let inner = [(i, nx), (j, ny), (k, nz)].iter().all(|&(x, n)| x > 0 && x + 1 < n);
+            *value = if inner && state >> 31 == 0 { -1.0 } else { 1.0 };
+        }
+        let surface = polygonize(&volume, 0.0);
+        let topology = Topology::new(&surface);
+        assert!(surface.n_faces() > 1000 && topology.is_closed() && topology.is_manifold());
+        assert!(topology.inconsistent_edges().is_empty());
+    }
 
     #[test]
     fn level_sets_of_a_torus_are_closed_manifolds_of_its_area() {

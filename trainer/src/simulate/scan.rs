@@ -136,10 +136,11 @@ pub fn simulate_scan(registration: &Mesh, options: &ScanOptions, index: u64) -> 
     let surface = remesh(registration, options, unit, &mut rng)?;
     let open = open(&surface, options, unit, &mut rng);
     let rough = roughen(&open, options.noise * unit, &mut rng)?;
-    Ok(with_pieces(rough, options, unit, &mut rng))
+    let pieces = rng.random_range(0..=options.pieces);
+    Ok(with_pieces(rough, pieces, [0.012 * unit, 0.03 * unit], &mut rng))
 }
 
-fn closed(mesh: &Mesh) -> Result<(), SimulateError> {
+pub(super) fn closed(mesh: &Mesh) -> Result<(), SimulateError> {
     let topology = Topology::new(mesh);
     let open = (0..topology.edges().len()).find(|&e| !topology.n_faces_of(e).is_multiple_of(2));
     match open {
@@ -156,22 +157,33 @@ fn remesh(
     unit: f64,
     rng: &mut ChaCha8Rng,
 ) -> Result<Mesh, SimulateError> {
-    let (axis, angle) = (direction(rng), uniform(rng, -TURN, TURN));
-    let turned = transformed(&refine(registration), rotation(axis, angle), 1.0, [0.0; 3]);
     // An even triangulation by equilateral triangles of side s has 2 / (sqrt(3) s^2) vertices per area.
     let edge = (2.0 / (3f64.sqrt() * options.vertices as f64)).sqrt();
     let cell = unit * (edge / CELLS_PER_EDGE).min(options.detail);
-    let radius = 0.5 * options.contact * unit;
+    let dense = solid(&refine(registration), cell, options.contact * unit, rng)?;
+    Ok(decimate(&dense, options.vertices, &DecimateOptions::default())?.mesh)
+}
+
+/// The surface of the shape's volume on a turned grid of spacing `cell`, in which surfaces nearer than `contact` have grown
+/// together: its largest component.
+pub(super) fn solid(
+    mesh: &Mesh,
+    cell: f64,
+    contact: f64,
+    rng: &mut ChaCha8Rng,
+) -> Result<Mesh, SimulateError> {
+    let (axis, angle) = (direction(rng), uniform(rng, -TURN, TURN));
+    let turned = transformed(mesh, rotation(axis, angle), 1.0, [0.0; 3]);
+    let radius = 0.5 * contact;
     let mut volume = Volume::new(&turned, cell, radius + 2.0 * cell);
     if radius > 0.0 {
         volume.close(radius);
     }
     let dense = largest_component(&polygonize(&volume, 0.0)).mesh;
-    if dense.n_faces() == 0 {
-        return Err(SimulateError::Empty);
+    match dense.n_faces() {
+        0 => Err(SimulateError::Empty),
+        _ => Ok(transformed(&dense, rotation(axis, -angle), 1.0, [0.0; 3])),
     }
-    let scan = decimate(&dense, options.vertices, &DecimateOptions::default())?.mesh;
-    Ok(transformed(&scan, rotation(axis, -angle), 1.0, [0.0; 3]))
 }
 
 /// Without some of what no camera sees, and with holes.
@@ -202,7 +214,7 @@ fn open(mesh: &Mesh, options: &ScanOptions, unit: f64, rng: &mut ChaCha8Rng) -> 
 }
 
 /// Moves the vertices along their normals by noise that neighbours share in part, as smoothing by the scanner leaves it.
-fn roughen(mesh: &Mesh, deviation: f64, rng: &mut ChaCha8Rng) -> Result<Mesh, SimulateError> {
+pub(super) fn roughen(mesh: &Mesh, deviation: f64, rng: &mut ChaCha8Rng) -> Result<Mesh, SimulateError> {
     let white: Vec<f64> = (0..mesh.n_vertices()).map(|_| normal(rng)).collect();
     let adjacency = Topology::new(mesh).adjacency();
     let smooth = |i: usize| {
@@ -219,14 +231,16 @@ fn roughen(mesh: &Mesh, deviation: f64, rng: &mut ChaCha8Rng) -> Result<Mesh, Si
     Ok(Mesh::new(vertices, mesh.faces().to_vec()).expect("finite displacements keep a mesh valid"))
 }
 
-/// With copies of small patches beside the surface: what a scanner makes of reflections and hair.
-fn with_pieces(mesh: Mesh, options: &ScanOptions, unit: f64, rng: &mut ChaCha8Rng) -> Mesh {
+/// With copies of small patches beside the surface: what a scanner makes of reflections and hair. Their radii are in the given
+/// range. The faces of the surface come first.
+pub(super) fn with_pieces(mesh: Mesh, count: usize, radii: [f64; 2], rng: &mut ChaCha8Rng) -> Mesh {
     let (adjacency, areas, normals) =
         (Topology::new(&mesh).adjacency(), mesh.vertex_areas(), vertex_normals(&mesh));
+    let unit = mesh.scale();
     let mut pieces = Vec::new();
-    for _ in 0..rng.random_range(0..=options.pieces) {
+    for _ in 0..count {
         let center = weighted(rng, &areas);
-        let radius = unit * uniform(rng, 0.012, 0.03);
+        let radius = uniform(rng, radii[0], radii[1]);
         let mut inside = vec![false; mesh.n_vertices()];
         disc(&mesh, &adjacency, center, radius).into_iter().for_each(|i| inside[i as usize] = true);
         let piece = carve(&mesh, |i| inside[i as usize]).mesh;

@@ -229,3 +229,94 @@ fn written_parts_are_read_as_shrec16() {
     let error = write_parts(&few, &out.path().join("few"), &options, &quiet).unwrap_err();
     assert!(error.to_string().contains("class cat has 2 shapes"), "{error}");
 }
+
+fn triangulation_options() -> TriangulationOptions {
+    TriangulationOptions {
+        min_vertices: 400,
+        typical_vertices: 500,
+        max_vertices: 600,
+        landmarks: 100,
+        ..TriangulationOptions::default()
+    }
+}
+
+#[test]
+fn written_triangulations_keep_groups_splits_and_points() {
+    let data = folder_of(&["cat0.off", "cat4.off", "dog1.off"]);
+    let out = tempfile::tempdir().unwrap();
+    let dataset = Dataset::open(data.path()).unwrap();
+    let splits = [Split::Train, Split::Validation];
+    let options = TriangulationOptions { copies: 2, ..triangulation_options() };
+    assert_eq!(write_triangulations(&dataset, &splits, out.path(), &options, &quiet).unwrap(), 6);
+    let written = Dataset::open(out.path()).unwrap();
+    let found: Vec<(&str, &str, Split)> =
+        written.shapes.iter().map(|s| (s.name.as_str(), s.group.as_str(), s.split)).collect();
+    let (train, validation) = (Split::Train, Split::Validation);
+    let expected = [
+        ("cat0_0", "cat", train),
+        ("cat0_1", "cat", train),
+        ("cat4_0", "cat", validation),
+        ("cat4_1", "cat", validation),
+        ("dog1_0", "dog", train),
+        ("dog1_1", "dog", train),
+    ];
+    assert_eq!(found, expected);
+    // The landmarks are the same of all shapes of a group: each lies near the same vertex of every pose.
+    let mut vertices: Vec<Option<u32>> = vec![None; 100];
+    for (pose, entry) in [0, 0, 1, 1].into_iter().zip(&written.shapes) {
+        let (mesh, whole) = (entry.read().unwrap(), shape(pose));
+        let points = entry.surface_points(&mesh).unwrap();
+        assert_eq!(points.len(), 100);
+        assert!(points.iter().flatten().count() > 40, "{}", entry.name);
+        for (known, point) in vertices.iter_mut().zip(points) {
+            let Some(p) = point.map(|p| p.position(&mesh)) else { continue };
+            match *known {
+                None => *known = Some(nearest_vertices(whole.vertices(), &[p])[0]),
+                Some(vertex) => {
+                    let distance = vec3::distance(p, whole.vertices()[vertex as usize]) / whole.scale();
+                    assert!(distance < 0.1, "{}: {distance}", entry.name);
+                }
+            }
+        }
+    }
+
+    // An interrupted run goes on; another one does not mix with it.
+    let files = ["shapes/cat4_1.ply", "shapes/cat4_1.corr", "dataset.toml"];
+    let before = files.map(|file| bytes(out.path(), file));
+    files.iter().for_each(|file| std::fs::remove_file(out.path().join(file)).unwrap());
+    write_triangulations(&dataset, &splits, out.path(), &options, &quiet).unwrap();
+    assert_eq!(files.map(|file| bytes(out.path(), file)), before);
+    let other = TriangulationOptions { seed: 7, ..options };
+    let error = write_triangulations(&dataset, &splits, out.path(), &other, &quiet).unwrap_err();
+    assert!(error.to_string().contains("simulation.toml"), "{error}");
+}
+
+#[test]
+fn triangulations_can_be_triangulated_again() {
+    let data = folder_of(&["cat0.off", "cat1.off"]);
+    let (first, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let options = triangulation_options();
+    let write = |from: &Path, to: &Path, seed| {
+        let options = TriangulationOptions { seed, ..options.clone() };
+        write_triangulations(&Dataset::open(from).unwrap(), &[Split::Train], to, &options, &quiet)
+    };
+    assert_eq!(write(data.path(), first.path(), 0).unwrap(), 2);
+    assert_eq!(write(first.path(), second.path(), 1).unwrap(), 2);
+    let again = &Dataset::open(second.path()).unwrap().shapes[0];
+    assert_eq!(again.surface_points(&again.read().unwrap()).unwrap().len(), 100);
+
+    // Shapes of one group must have the same points.
+    let unlike = tempfile::tempdir().unwrap();
+    write_mesh(&unlike.path().join("cat0.off"), &shape(0), &Attributes::default()).unwrap();
+    write_mesh(&unlike.path().join("cat1.off"), &bumpy_sphere(2, 1), &Attributes::default()).unwrap();
+    let error = write(unlike.path(), &unlike.path().join("out"), 0).unwrap_err().to_string();
+    assert!(error.contains("cat1") && error.contains("162 points, but cat0"), "{error}");
+    let none = write_triangulations(
+        &Dataset::open(data.path()).unwrap(),
+        &[Split::Test],
+        &data.path().join("out"),
+        &options,
+        &quiet,
+    );
+    assert!(none.unwrap_err().to_string().contains("no shapes in these splits"));
+}

@@ -133,7 +133,7 @@ pub(super) fn vertex_normals(mesh: &Mesh) -> Vec<Vec3> {
     normals.into_iter().map(unit).collect()
 }
 
-fn unit(p: Vec3) -> Vec3 {
+pub(super) fn unit(p: Vec3) -> Vec3 {
     let norm = vec3::norm(p);
     if norm > 0.0 { vec3::scale(p, 1.0 / norm) } else { p }
 }

@@ -5,7 +5,7 @@ use fmnet::fmap::SolverKind;
 use fmnet::pipeline::Refinement;
 use fmnet_trainer::config::{TrainConfig, TrainOverrides};
 use fmnet_trainer::dataset::Split;
-use fmnet_trainer::simulate::{PartOptions, ScanOptions};
+use fmnet_trainer::simulate::{PartOptions, ScanOptions, TriangulationOptions};
 use std::path::PathBuf;
 
 /// Trains the descriptor network of fmnet through the functional map, and exports it to ONNX.
@@ -42,7 +42,7 @@ pub(crate) struct Common {
 pub(crate) enum Command {
     /// Generate a dataset of deforming bodies with exact ground truth
     Synth(SynthArgs),
-    /// Make stand-ins for scans, or parts of a whole, from registered shapes; an interrupted run goes on where it was
+    /// Make scans, parts or other triangulations of a dataset's shapes; an interrupted run goes on where it was
     Simulate(SimulateArgs),
     /// Compute eigenbases, SHOT and geodesic distances of a dataset once; an interrupted run goes on where it was
     Preprocess(PreprocessArgs),
@@ -131,6 +131,27 @@ pub(crate) enum Simulated {
         out: PathBuf,
         #[command(flatten)]
         options: PartOptions,
+    },
+    /// Shapes triangulated as other people and programs would have done it, with points on the surface that correspond
+    ///
+    /// Writes OUT/shapes/NAME.ply with NAME.corr (line i: the triangle, counted from 1, and the three
+    /// weights of point i, -1 where it is missing) and OUT/dataset.toml. Each shape is triangulated on
+    /// its own in a manner that is drawn for it, and some get noise, holes, cut ends, glued contacts
+    /// and stray pieces. Groups and splits are the dataset's.
+    ///
+    ///   fmnet-train simulate triangulations FAUST/registrations data/faust-triangulations
+    ///   fmnet-train train --dataset data/faust-triangulations --out runs/faust
+    #[command(verbatim_doc_comment)]
+    Triangulations {
+        /// Any dataset
+        dataset: PathBuf,
+        /// Folder for the triangulations
+        out: PathBuf,
+        /// Splits of the dataset to triangulate, separated by commas
+        #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Split::Train, Split::Validation, Split::Test])]
+        splits: Vec<Split>,
+        #[command(flatten)]
+        options: TriangulationOptions,
     },
 }
 

@@ -5,7 +5,7 @@ use crate::progress::Progress;
 use anyhow::Result;
 use fmnet_trainer::dataset::Dataset;
 use fmnet_trainer::events::TrainEvent;
-use fmnet_trainer::simulate::{write_parts, write_scans};
+use fmnet_trainer::simulate::{write_parts, write_scans, write_triangulations};
 use serde_json::json;
 
 pub(crate) fn run(args: &SimulateArgs, common: &Common) -> Result<()> {
@@ -19,6 +19,10 @@ pub(crate) fn run(args: &SimulateArgs, common: &Common) -> Result<()> {
         }
         Simulated::Parts { dataset, out, options } => {
             (out, "parts", write_parts(&Dataset::open(dataset)?, out, options, &tell)?)
+        }
+        Simulated::Triangulations { dataset, out, splits, options } => {
+            let dataset = Dataset::open(dataset)?;
+            (out, "triangulations", write_triangulations(&dataset, splits, out, options, &tell)?)
         }
     };
     progress.say(&format!("{count} {what} in {}", out.display()));
