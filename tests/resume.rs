@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;
-use fmnet::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::train::{LAST, METRICS, TrainError, train};
 use std::path::Path;
 use std::sync::Mutex;

@@ -60,6 +60,9 @@ pub(crate) enum Command {
 pub(crate) struct SynthArgs {
     /// Folder for the dataset
     pub(crate) folder: PathBuf,
+    /// Write the two bodies of `fmnet-infer demo` instead, source.ply and target.ply
+    #[arg(long)]
+    pub(crate) demo: bool,
     /// Individuals of each species, 2 and up
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) count: u32,

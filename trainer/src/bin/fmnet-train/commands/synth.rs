@@ -3,8 +3,8 @@
 use crate::args::{Common, SynthArgs};
 use crate::progress::Progress;
 use anyhow::Result;
-use fmnet::synth::{DatasetOptions, SynthOptions, write_dataset};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::synth::{DEMO_LANDMARKS, DatasetOptions, SynthOptions, write_dataset, write_demo};
 use serde_json::json;
 
 pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
@@ -23,6 +23,14 @@ pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
         ..DatasetOptions::default()
     };
     let progress = Progress::new(common);
+    if args.demo {
+        write_demo(&args.folder)?;
+        progress.say(&format!(
+            "two bodies with {DEMO_LANDMARKS} corresponding vertices in {}",
+            args.folder.display()
+        ));
+        return Ok(());
+    }
     write_dataset(&args.folder, &options, &|done, total| {
         progress.event(TrainEvent::Prepared { done, total, shape: "body".into() });
     })?;
