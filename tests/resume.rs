@@ -46,7 +46,7 @@ fn a_stopped_run_goes_on_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
     let options = DatasetOptions {
-        species: vec![Species::Child],
+        species: Species::from_name("child").into_iter().collect(),
         per_species: 4,
         validation: 0.5,
         ..Default::default()

@@ -25,6 +25,7 @@ mod mirror;
 mod options;
 mod polygonize;
 mod pose;
+mod postures;
 mod proportions;
 mod quadruped;
 mod random;

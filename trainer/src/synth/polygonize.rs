@@ -8,6 +8,7 @@ use fmnet::mesh::vec3;
 
 use super::implicit::{Part, folded, symmetric_field};
 use super::math::Vec3;
+use super::mirror::{mirrored, pair_up};
 
 /// Cells along each side of a block of the grid.
 const BLOCK: usize = 4;
@@ -21,6 +22,8 @@ pub(super) struct Surface {
     pub(super) active: Vec<Vec<u16>>,
     /// For each vertex its list in `active`.
     pub(super) block_of: Vec<u32>,
+    /// Of every vertex the one at its mirror image.
+    pub(super) twins: Vec<u32>,
 }
 
 struct Grid {
@@ -68,7 +71,8 @@ pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
     let quads: Vec<Vec<[u32; 4]>> =
         (0..n_blocks).into_par_iter().map(|b| grid.quads(&blocks, &first, b)).collect();
     let active = blocks.into_iter().map(|block| block.active).collect();
-    let mut surface = Surface { vertices, faces: Vec::new(), active, block_of };
+    let twins = pair_up(&mut vertices);
+    let mut surface = Surface { vertices, faces: Vec::new(), active, block_of, twins };
     let quads = quads.concat();
     surface.project(parts, cell, 2);
     surface.even_out(&quads);
@@ -89,9 +93,10 @@ impl Surface {
         symmetric_field(self.active[self.block_of[i] as usize].iter().map(|&part| &parts[part as usize]), p)
     }
 
-    /// Newton steps onto the zero set, each at most a cell long.
+    /// Newton steps onto the zero set, each at most a cell long, on the left side; the right one is its mirror image.
     fn project(&mut self, parts: &[Part], cell: f64, steps: usize) {
-        let projected = (0..self.vertices.len()).into_par_iter().map(|i| {
+        let left: Vec<usize> = (0..self.vertices.len()).filter(|&i| self.vertices[i][0] > 0.0).collect();
+        let projected = left.par_iter().map(|&i| {
             let (mut p, delta) = (self.vertices[i], 0.05 * cell);
             for _ in 0..steps {
                 let value = self.value(parts, i, p);
@@ -105,7 +110,11 @@ impl Surface {
             }
             p
         });
-        self.vertices = projected.collect();
+        let projected: Vec<Vec3> = projected.collect();
+        for (i, p) in left.into_iter().zip(projected) {
+            self.vertices[i] = p;
+            self.vertices[self.twins[i] as usize] = mirrored(p);
+        }
     }
 
     /// Moves every vertex half-way to the mean of its neighbours, which evens out the triangles.
@@ -168,8 +177,7 @@ impl Grid {
         let mut blocks: Vec<Block> = (0..n_blocks).into_par_iter().map(|b| self.survey(parts, b)).collect();
         let mut wanted: Vec<usize> = (0..n_blocks).filter(|&b| !blocks[b].values.is_empty()).collect();
         while !wanted.is_empty() {
-            let values: Vec<Vec<f64>> =
-                wanted.par_iter().map(|&b| self.values(parts, &blocks[b], b)).collect();
+            let values: Vec<Vec<f64>> = wanted.par_iter().map(|&b| self.values(parts, &blocks, b)).collect();
             wanted.iter().zip(values).for_each(|(&b, values)| blocks[b].values = values);
             let doubtful =
                 wanted.iter().flat_map(|&b| self.neighbors(b).into_iter().map(move |other| (b, other)));
@@ -228,12 +236,19 @@ impl Grid {
         Block { active, inside: value < 0.0, values, ..Block::default() }
     }
 
-    /// Values at the block's own corners.
-    fn values(&self, parts: &[Part], block: &Block, b: usize) -> Vec<f64> {
+    /// Values at the block's own corners. A corner on the right is judged by the parts of the block that owns its mirror image,
+    /// so that both have the same value.
+    fn values(&self, parts: &[Part], blocks: &[Block], b: usize) -> Vec<f64> {
         let place = self.place(b);
-        let at = |c: usize| self.corner(place, [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)]);
-        let near = || block.active.iter().map(|&part| &parts[part as usize]);
-        (0..BLOCK.pow(3)).map(|c| symmetric_field(near(), at(c))).collect()
+        let width = self.blocks[0] * BLOCK;
+        let at = |c: usize| {
+            let offset = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
+            let x = place[0] * BLOCK + offset[0];
+            let owner = if x > 0 && 2 * x < width { b - place[0] + (width - x) / BLOCK } else { b };
+            let near = blocks[owner].active.iter().map(|&part| &parts[part as usize]);
+            symmetric_field(near, self.corner(place, offset))
+        };
+        (0..BLOCK.pow(3)).map(at).collect()
     }
 
     /// Values at the corners of the cells of block `b`, `CORNERS` along each side: its own and its neighbours'.

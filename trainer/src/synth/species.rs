@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use super::correspond::Landmarks;
-use super::random::{Purpose, chance, generator, uniform};
+use super::random::{Purpose, chance, generator, generator_of_trial, uniform};
 use super::recipe::Recipe;
 use super::surface::Surface;
 use super::{biped, quadruped};
@@ -101,9 +101,9 @@ impl Species {
     }
 
     /// The body of a breed: 0 has the typical proportions and wears nothing; others have proportions around these, or between
-    /// these and those of another species.
-    pub(super) fn recipe(self, breed: u64) -> Recipe {
-        let mut rng = generator(self.index(), breed, Purpose::Breed);
+    /// these and those of another species. Another `trial` draws anew.
+    pub(super) fn recipe(self, breed: u64, trial: u8) -> Recipe {
+        let mut rng = generator_of_trial(self.index(), breed, Purpose::Breed, trial);
         let other = (chance(&mut rng, MIXED) && breed > 0).then(|| {
             (uniform(&mut rng, 0.0, self.family.n_species() as f64) as usize, uniform(&mut rng, 0.2, 0.6))
         });

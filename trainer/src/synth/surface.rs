@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use fmnet::mesh::{nearest_k_vertices, vec3};
 
 use super::UNMATCHED;
-use super::adjacency::Adjacency;
+use super::adjacency::{Adjacency, components};
 use super::correspond::Landmarks;
 use super::math::Vec3;
-use super::mirror::{mirrored, opposite_bones, pair_up};
+use super::mirror::{mirrored, opposite_bones};
 use super::polygonize::polygonize;
 use super::random::permutation;
 use super::recipe::Recipe;
@@ -34,7 +34,7 @@ pub(super) struct Surface {
 impl Surface {
     pub(super) fn of(recipe: &Recipe) -> Self {
         let surface = polygonize(&recipe.parts, recipe.cell);
-        let (mut points, faces) = (surface.vertices, surface.faces);
+        let (points, faces, twins) = (surface.vertices, surface.faces, surface.twins);
         let bone = |i: usize| {
             // Blocks on the right name the parts of the left, which the body there is the image of.
             let p = [points[i][0].abs(), points[i][1], points[i][2]];
@@ -48,7 +48,6 @@ impl Surface {
         let of_side =
             |(i, bone): (usize, usize)| (if points[i][0] < 0.0 { opposite[bone] } else { bone }) as u8;
         let bone_of: Vec<u8> = bones.into_iter().enumerate().map(of_side).collect();
-        let twins = pair_up(&mut points);
         let mut influences =
             diffused_weights(&recipe.skeleton, &bone_of, &Adjacency::new(points.len(), &faces));
         for i in (0..points.len()).filter(|&i| points[i][0] > 0.0) {
@@ -57,6 +56,12 @@ impl Surface {
             influences[twins[i] as usize] = image;
         }
         Self { points, faces, twins, influences }
+    }
+
+    /// Whether it is one closed piece without handles.
+    pub(super) fn is_sphere(&self) -> bool {
+        let pieces = components(self.points.len(), &self.faces);
+        self.points.len() == self.faces.len() / 2 + 2 && pieces.iter().all(|&piece| piece == 0)
     }
 
     /// Moves a vertex to each place of the left side, and its twin to the mirror image: the two vertices of each place, or

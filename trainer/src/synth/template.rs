@@ -15,6 +15,8 @@ use super::species::{Family, Species};
 use super::surface::Surface;
 use super::{gait, pose};
 
+/// Proportions tried before a body that is no sphere is taken as it is.
+const BREED_TRIALS: u8 = 12;
 /// Poses tried before the one with the least self-penetration is taken.
 const POSE_TRIALS: usize = 24;
 /// Self-penetration, relative to the thinner limb's radius, that a pose may have.
@@ -24,7 +26,6 @@ const PENETRATION: f64 = 0.4;
 /// less; so build it once for several individuals.
 pub struct Template {
     pub(super) species: Species,
-    breed: u64,
     pub(super) recipe: Recipe,
     /// Surface as polygonised, fine detail enlarged.
     pub(super) points: Vec<Vec3>,
@@ -44,8 +45,7 @@ pub struct Template {
 impl Template {
     /// Builds the template of a breed: breed 0 has the typical proportions of the species, others differ from it.
     pub fn new(species: Species, breed: u64) -> Self {
-        let recipe = species.recipe(breed);
-        let mut surface = Surface::of(&recipe);
+        let (recipe, mut surface) = sound_body(species, breed);
         let places = species.family().landmarks().on(&recipe.parts, recipe.scale);
         let landmarks = surface.snap_to(&places);
         let Surface { points, faces, twins, influences } = surface;
@@ -59,20 +59,7 @@ impl Template {
         let rest = scale_bones(&recipe.skeleton, &influences, &points, &typical.scales);
         let reaches = recipe.features.iter().map(|feature| reach_of(feature, &points, &normals)).collect();
         let proxies = Proxies::new(&recipe, &typical);
-        Self {
-            species,
-            breed,
-            recipe,
-            points,
-            normals,
-            faces,
-            influences,
-            twins,
-            reaches,
-            proxies,
-            rest,
-            landmarks,
-        }
+        Self { species, recipe, points, normals, faces, influences, twins, reaches, proxies, rest, landmarks }
     }
 
     /// The species it is the template of.
@@ -149,6 +136,19 @@ impl Template {
             }
         }
         best.1
+    }
+}
+
+/// A breed's body without handles and loose pieces, which some proportions give; they are drawn anew then.
+fn sound_body(species: Species, breed: u64) -> (Recipe, Surface) {
+    let mut trial = 0;
+    loop {
+        let recipe = species.recipe(breed, trial);
+        let surface = Surface::of(&recipe);
+        trial += 1;
+        if trial == BREED_TRIALS || surface.is_sphere() {
+            return (recipe, surface);
+        }
     }
 }
 

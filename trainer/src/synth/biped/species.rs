@@ -60,7 +60,7 @@ species! {
     }
     armadillo {
         height: 1.5, head: 1.15, ear: 2.2, ear_rise: 0.8, neck: 1.35, neck_length: 0.7, shoulders: 1.1, chest: 1.2,
-        waist: 1.3, hips: 1.12, belly: 0.03, muscle: 1.25, arm_length: 0.95, arm_girth: 1.3, hand: 1.3, mitten: 0.3,
+        waist: 1.3, hips: 1.12, belly: 0.03, muscle: 1.25, arm_length: 0.95, arm_girth: 1.3, hand: 1.3, spread: 1.2,
         leg_length: 0.75, leg_girth: 1.25, foot: 1.35, snout: 1.5, tail: 0.9, tail_girth: 1.7,
     }
     bearman {
