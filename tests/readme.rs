@@ -53,7 +53,16 @@ fn words(command: &str) -> Words {
 /// What a page's command is made to do here, in addition, so that it takes seconds.
 fn shortened(program: &str, command: &str) -> &'static [&'static str] {
     match (program, command) {
-        ("fmnet-train", "synth") => &["--count", "3", "--min-vertices", "4000", "--max-vertices", "4000"],
+        ("fmnet-train", "synth") => &[
+            "--count",
+            "3",
+            "--species",
+            "man,slender,dog",
+            "--min-vertices",
+            "4000",
+            "--max-vertices",
+            "4000",
+        ],
         ("fmnet-train", "train") => &[
             "--steps",
             "2",

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;
-use fmnet::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::train::{LAST, METRICS, TrainError, train};
 use std::path::Path;
 use std::sync::Mutex;
@@ -46,7 +46,7 @@ fn a_stopped_run_goes_on_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
     let options = DatasetOptions {
-        species: vec![Species::Child],
+        species: Species::from_name("child").into_iter().collect(),
         per_species: 4,
         validation: 0.5,
         ..Default::default()

@@ -5,7 +5,7 @@
 //! its vertices, is upscaled by the l2,1 problem and by least squares. Errors are mean geodesic x 100, relative to sqrt(area).
 //!
 //! `cargo bench --workspace --bench upscale -- [SOURCE TARGET] [--subdivisions N] [--vertices N]`: mesh files of one connectivity;
-//! without them a generated body and a bent copy of it. Options of every bench: `-- --help`.
+//! without them a body of the demo and a bent copy of it. Options of every bench: `-- --help`.
 
 mod support;
 
@@ -14,7 +14,6 @@ use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::mesh::{DecimateOptions, Decimated, decimate, nearest_vertices, shapes};
 use fmnet::point_map::{PointMap, recover};
 use fmnet::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
-use fmnet::synth::{Species, demo_pair};
 use fmnet::upscale::{
     AdmmOptions, delta_coefficients, full_point_map, l21_functional_map, least_squares_functional_map,
 };
@@ -23,7 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 use std::path::Path;
 use support::report::{Report, measured};
-use support::shapes::displaced;
+use support::shapes::{demo_body, displaced};
 
 /// Eigenfunctions of the full meshes, as in the pipeline.
 const K: usize = 100;
@@ -60,7 +59,7 @@ fn main() {
 
 /// A body, and the same bent about its height.
 fn generated() -> [Mesh; 2] {
-    let mesh = demo_pair(Species::Man, 0).source.mesh;
+    let mesh = demo_body("source");
     let bend = |&[x, y, z]: &[f64; 3]| {
         let (sin, cos) = (0.4 * y).sin_cos();
         [x * cos - z * sin, y, x * sin + z * cos + 0.1 * y * y]

@@ -1,4 +1,4 @@
-//! A texture carried to two other bodies over maps of the built-in model, written as OBJ and GLB, and pictured.
+//! A texture carried to another body over a map of the built-in model, written as OBJ and GLB, and pictured.
 //!
 //! ```sh
 //! cargo run --release --example transfer -- FOLDER
@@ -8,14 +8,13 @@
 //! program `fmnet-infer` does the same with files: `match RECEIVER GIVER -o map.txt`, then `transfer RECEIVER GIVER --map map.txt`.
 
 use fmnet::Mesh;
-use fmnet::io::{Attributes, Texture, write_atomically, write_mesh};
+use fmnet::io::{Attributes, Texture, read_mesh, write_atomically, write_mesh};
 use fmnet::mesh::shapes::{rotation, transformed};
 use fmnet::pipeline::{MatchOptions, match_meshes};
 use fmnet::render::{Donors, Picture, textured_picture, transfer_attributes};
-use fmnet::synth::{DemoPair, Species, demo_pair};
 use std::error::Error;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Pixels of the texture, of its squares, and of each body's picture.
 const TEXTURE: usize = 1024;
@@ -24,8 +23,9 @@ const PICTURE: [usize; 2] = [360, 520];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| ".".into()));
-    let DemoPair { source, target, .. } = demo_pair(Species::Man, 0);
-    let giver = source.mesh;
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("demo");
+    let giver = read_mesh(&demo.join("source.ply"))?.mesh;
+    let receiver = read_mesh(&demo.join("target.ply"))?.mesh;
     let image = squares();
     let attributes = Attributes {
         corner_uvs: Some(front_and_back(&giver)),
@@ -35,14 +35,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_mesh(&folder.join("giver.obj"), &giver, &attributes)?;
     // Each body faces another way; they are turned toward the viewer.
     let mut pictures = vec![pictured(&giver, &attributes, &image, PI + 0.3)];
-    let other = demo_pair(Species::Man, 1).source.mesh;
-    for (name, receiver, turn) in [("sitting", target.mesh, 0.6 - FRAC_PI_2), ("other", other, -0.7)] {
-        let found = match_meshes(&receiver, &giver, &MatchOptions::default())?;
-        let donors = Donors::of_source(&found.map).interpolated(&receiver, &giver);
-        let moved = transfer_attributes(&giver, &attributes, &receiver, &donors);
-        write_mesh(&folder.join(format!("{name}.glb")), &receiver, &moved)?;
-        pictures.push(pictured(&receiver, &moved, &image, turn));
-    }
+    let found = match_meshes(&receiver, &giver, &MatchOptions::default())?;
+    let donors = Donors::of_source(&found.map).interpolated(&receiver, &giver);
+    let moved = transfer_attributes(&giver, &attributes, &receiver, &donors);
+    write_mesh(&folder.join("receiver.glb"), &receiver, &moved)?;
+    pictures.push(pictured(&receiver, &moved, &image, 0.6 - FRAC_PI_2));
     write_atomically(&folder.join("transfer.png"), |file| file.write_all(&side_by_side(&pictures).to_png()))?;
     Ok(())
 }

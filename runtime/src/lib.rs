@@ -52,7 +52,7 @@
 //! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |
 //!
 //! [`pipeline`] knows their order, [`shape`] what is computed of one shape; [`cache`] keeps it in a folder, [`memory`] refuses what
-//! would not fit, [`events`] tell how far it is. [`synth`] makes bodies with exact correspondences.
+//! would not fit, [`events`] tell how far it is.
 //!
 //! # Conventions
 //!
@@ -89,7 +89,6 @@ pub mod refine;
 pub mod render;
 pub mod shape;
 pub mod spectral;
-pub mod synth;
 pub mod upscale;
 
 pub use error::Error;

@@ -4,9 +4,10 @@ use fmnet::Mesh;
 use fmnet::eval::{GroundTruth, geodesic_errors};
 use fmnet::events::ignore;
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
+use fmnet::io::read_mesh;
 use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
 use fmnet::point_map::PointMap;
-use fmnet::synth::{Species, demo_pair};
+use std::path::Path;
 
 /// What is left of a mesh without its highest fifth along an axis; the vertices there are no longer in any face.
 fn cut(mesh: &Mesh, axis: usize) -> Mesh {
@@ -30,8 +31,8 @@ fn long_axis(mesh: &Mesh) -> usize {
 
 #[test]
 fn a_part_described_as_such_finds_its_place() {
-    let pair = demo_pair(Species::Man, 0);
-    let whole = &pair.source.mesh;
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply");
+    let whole = &read_mesh(&file).unwrap().mesh;
     let part = cut(whole, long_axis(whole));
     let matcher = Matcher::new(&MatchOptions::default()).unwrap();
     let target = matcher.describe("whole", whole, &ignore).unwrap();

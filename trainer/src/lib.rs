@@ -55,6 +55,7 @@ pub mod sampler;
 pub mod simulate;
 pub mod soft_map;
 pub mod step;
+pub mod synth;
 #[cfg(test)]
 mod testing;
 pub mod train;

@@ -1,9 +1,8 @@
 //! Shapes of any size that the benches run on.
 #![allow(dead_code, reason = "each bench uses a part of it")]
 
-use fmnet::io::{IoError, write_matrix};
+use fmnet::io::{IoError, read_mesh, write_matrix};
 use fmnet::mesh::{DecimateOptions, decimate, shapes};
-use fmnet::synth::{Species, demo_pair};
 use fmnet::{Matrix, Mesh};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,12 +19,11 @@ pub(crate) fn bumpy_torus(ring: usize, tube: usize) -> Mesh {
     Mesh::new(vertices, torus.faces().to_vec()).expect("the faces are those of the torus")
 }
 
-/// Source and target: two generated people in different poses, closed, of exactly `n` vertices each and triangulated on their
+/// Source and target: the two people of the demo, closed, of exactly `n` vertices each and triangulated on their
 /// own.
 pub(crate) fn bodies(n: usize) -> [Mesh; 2] {
-    let pair = demo_pair(Species::Man, 0);
     let mut seed = 0;
-    [pair.source.mesh, pair.target.mesh].map(|mut mesh| {
+    [demo_body("source"), demo_body("target")].map(|mut mesh| {
         while 4 * mesh.n_vertices() < 5 * n {
             mesh = shapes::subdivide(&mesh);
         }
@@ -34,6 +32,12 @@ pub(crate) fn bodies(n: usize) -> [Mesh; 2] {
         let dense = displaced(mesh, seed);
         decimate(&dense, n, &DecimateOptions::default()).expect("bodies are manifold").mesh
     })
+}
+
+/// The `source` or the `target` of the demo.
+pub(crate) fn demo_body(name: &str) -> Mesh {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("demo/{name}.ply"));
+    read_mesh(&file).expect("the demo's bodies are in the repository").mesh
 }
 
 /// Every vertex moved along its normal by up to a tenth of the mean edge.

@@ -60,9 +60,18 @@ pub(crate) enum Command {
 pub(crate) struct SynthArgs {
     /// Folder for the dataset
     pub(crate) folder: PathBuf,
+    /// Write the two bodies of `fmnet-infer demo` instead, source.ply and target.ply
+    #[arg(long)]
+    pub(crate) demo: bool,
     /// Individuals of each species, 2 and up
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) count: u32,
+    /// Species, separated by commas, and families (biped, quadruped) for all of theirs [default: all]
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) species: Vec<String>,
+    /// Share of the individuals of each species that are for validation, 0 to 0.9
+    #[arg(long, default_value_t = 0.1)]
+    pub(crate) validation: f64,
     /// Seed, 0 to 65535: the same seed gives the same dataset
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u32,

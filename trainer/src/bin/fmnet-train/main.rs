@@ -9,12 +9,12 @@ mod progress;
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
 use fmnet::io::IoError;
-use fmnet::synth::SynthError;
 use fmnet_trainer::checkpoint::CheckpointError;
 use fmnet_trainer::export::ExportError;
 use fmnet_trainer::precompute::PrepareError;
 use fmnet_trainer::reproduce::ReproduceError;
 use fmnet_trainer::simulate::SimulateError;
+use fmnet_trainer::synth::SynthError;
 use fmnet_trainer::train::TrainError;
 use std::process::ExitCode;
 

@@ -2,9 +2,11 @@
 
 use crate::args::{Common, SynthArgs};
 use crate::progress::Progress;
-use anyhow::Result;
-use fmnet::synth::{DatasetOptions, SynthOptions, write_dataset};
+use anyhow::{Result, bail};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::synth::{
+    DEMO_LANDMARKS, DatasetOptions, Family, Species, SynthOptions, write_dataset, write_demo,
+};
 use serde_json::json;
 
 pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
@@ -17,12 +19,21 @@ pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
         ..SynthOptions::default()
     };
     let options = DatasetOptions {
+        species: chosen(&args.species)?,
         per_species: args.count as usize,
+        validation: args.validation,
         seed: args.seed,
         body,
-        ..DatasetOptions::default()
     };
     let progress = Progress::new(common);
+    if args.demo {
+        write_demo(&args.folder)?;
+        progress.say(&format!(
+            "two bodies with {DEMO_LANDMARKS} corresponding vertices in {}",
+            args.folder.display()
+        ));
+        return Ok(());
+    }
     write_dataset(&args.folder, &options, &|done, total| {
         progress.event(TrainEvent::Prepared { done, total, shape: "body".into() });
     })?;
@@ -36,4 +47,18 @@ pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
         println!("{:#}", json!({ "folder": args.folder, "shapes": shapes }));
     }
     Ok(())
+}
+
+/// The species of the given names, and those of the given families; all where there are none.
+fn chosen(names: &[String]) -> Result<Vec<Species>> {
+    let all = Species::all();
+    let known =
+        |name: &str| Family::ALL.iter().any(|f| f.name() == name) || all.iter().any(|s| s.name() == name);
+    if let Some(name) = names.iter().find(|name| !known(name)) {
+        let list: Vec<&str> = all.iter().map(|species| species.name()).collect();
+        bail!("--species: there is no {name}; there are biped, quadruped, {}", list.join(", "));
+    }
+    let wanted =
+        |s: &Species| names.iter().any(|name| [s.name(), s.family().name()].contains(&name.as_str()));
+    Ok(all.iter().copied().filter(|species| names.is_empty() || wanted(species)).collect())
 }

@@ -1,0 +1,44 @@
+//! Proportions of bodies: numbers that vary from species to species and from breed to breed.
+
+/// Defines `Proportions`: for each field its default and how much it varies, as the deviation of its logarithm, or of itself
+/// where the default is 0.
+macro_rules! proportions {
+    ($($(#[$doc:meta])* $field:ident = $default:expr, $spread:expr;)*) => {
+        /// Proportions of a species or breed, relative to the typical body's (1, or 0 for what it lacks) unless said otherwise.
+        #[derive(Clone, Copy, Debug)]
+        pub(in crate::synth) struct Proportions { $($(#[$doc])* pub(in crate::synth) $field: f64,)* }
+
+        impl Default for Proportions {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl Proportions {
+            /// Random proportions around these; `width` multiplies all deviations.
+            pub(in crate::synth) fn varied(mut self, rng: &mut impl rand::Rng, width: f64) -> Self {
+                $({
+                    let draw = $crate::synth::random::normal(rng, 0.0, width * $spread);
+                    self.$field = if $default == 0.0 { (self.$field + draw).max(0.0) } else { self.$field * draw.exp() };
+                })*
+                self
+            }
+
+            /// Between these and others: `t` = 0 gives these.
+            pub(in crate::synth) fn mixed(&self, other: &Self, t: f64) -> Self {
+                Self { $($field: self.$field + t * (other.$field - self.$field),)* }
+            }
+        }
+    };
+}
+
+/// Defines `SPECIES`, the species of a family: of each its name, and the proportions that are not the default ones.
+macro_rules! species {
+    ($($name:ident { $($field:ident: $value:expr),* $(,)? })*) => {
+        /// The name of each species, and its typical proportions.
+        pub(in crate::synth) const SPECIES: &[(&str, fn() -> Proportions)] =
+            &[$((stringify!($name), || Proportions { $($field: $value,)* ..Proportions::default() }),)*];
+    };
+}
+
+pub(super) use {proportions, species};

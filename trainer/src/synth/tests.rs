@@ -1,0 +1,304 @@
+use std::collections::HashMap;
+
+use super::mirror::mirrored;
+use super::template::Stance;
+use super::*;
+use fmnet::Mesh;
+use fmnet::Mesh;
+use fmnet::mesh::vec3;
+
+fn edge_counts(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
+    let mut counts = HashMap::new();
+    for &[a, b, c] in mesh.faces() {
+        for edge in [(a, b), (b, c), (c, a)] {
+            *counts.entry(edge).or_insert(0) += 1;
+        }
+    }
+    counts
+}
+
+/// Every directed edge once and its opposite once; every vertex's faces one fan; one component of genus 0.
+fn assert_closed_manifold_sphere(mesh: &Mesh, name: &str) {
+    let counts = edge_counts(mesh);
+    for (&(a, b), &count) in &counts {
+        assert_eq!(count, 1, "{name}: edge {a} {b} is used {count} times in one direction");
+        assert!(counts.contains_key(&(b, a)), "{name}: edge {a} {b} is on a border");
+    }
+    assert_eq!(mesh.n_vertices() + mesh.n_faces() - counts.len() / 2, 2, "{name}: Euler characteristic");
+    let labels = adjacency::components(mesh.n_vertices(), mesh.faces());
+    assert!(labels.iter().all(|&label| label == 0), "{name}: more than one component");
+    assert_single_fans(mesh, name);
+}
+
+fn assert_single_fans(mesh: &Mesh, name: &str) {
+    let mut links: Vec<HashMap<u32, u32>> = vec![HashMap::new(); mesh.n_vertices()];
+    for &[a, b, c] in mesh.faces() {
+        for (i, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
+            links[i as usize].insert(from, to);
+        }
+    }
+    for (i, link) in links.iter().enumerate() {
+        let start = *link.keys().next().unwrap();
+        let (mut at, mut steps) = (link[&start], 1);
+        while at != start {
+            at = link[&at];
+            steps += 1;
+        }
+        assert_eq!(steps, link.len(), "{name}: vertex {i} joins several fans");
+    }
+}
+
+fn volume(mesh: &Mesh) -> f64 {
+    (0..mesh.n_faces()).map(|f| vec3::dot(mesh.corners(f)[0], mesh.face_cross(f)) / 6.0).sum()
+}
+
+fn species(name: &str) -> Species {
+    Species::from_name(name).unwrap()
+}
+
+#[test]
+fn names_of_species_are_their_own() {
+    let all = Species::all();
+    for &species in &all {
+        assert_eq!(Species::from_name(species.name()), Some(species));
+    }
+    for family in Family::ALL {
+        let held_out = all.iter().filter(|s| s.family() == family && s.held_out()).count();
+        assert_eq!(held_out, 1, "{}", family.name());
+        assert!(all.iter().filter(|s| s.family() == family).count() >= 14);
+    }
+}
+
+#[test]
+fn templates_are_spheres_with_the_landmarks_of_their_family() {
+    for (name, breed) in
+        [("man", 0), ("teddy", 1), ("armadillo", 2), ("dog", 0), ("deer", 1), ("elephant", 2)]
+    {
+        let template = Template::new(species(name), breed);
+        let rest = template.rest_mesh();
+        assert_closed_manifold_sphere(&rest, name);
+        assert!(volume(&rest) > 0.0, "{name}: looks inwards");
+        assert!((28_000..90_000).contains(&rest.n_vertices()), "{name}: {}", rest.n_vertices());
+        assert!((2200..4000).contains(&template.n_landmarks()), "{name}: {}", template.n_landmarks());
+        let known: Vec<u32> = template.landmarks.iter().copied().filter(|&i| i != UNMATCHED).collect();
+        assert!(20 * known.len() > 17 * template.n_landmarks(), "{name} has only {} landmarks", known.len());
+        let different: std::collections::HashSet<_> = known.iter().collect();
+        assert_eq!(different.len(), known.len(), "{name}: two landmarks are one vertex");
+    }
+}
+
+/// A landmark that the base body has on a bone's skin is on the same bone's skin in every species, or on a neighbour's.
+#[test]
+fn landmarks_stay_on_their_part_of_the_body() {
+    for (base, others) in [("man", ["ape", "teddy"]), ("dog", ["horse", "giraffe"])] {
+        let base = Template::new(species(base), 0);
+        let skeleton = &base.recipe.skeleton;
+        for name in others {
+            let other = Template::new(species(name), 1);
+            let (mut same, mut near, mut total) = (0, 0, 0);
+            for (&i, &j) in base.landmarks.iter().zip(&other.landmarks) {
+                if i == UNMATCHED || j == UNMATCHED {
+                    continue;
+                }
+                let [a, b] =
+                    [base.influences[i as usize].strongest(), other.influences[j as usize].strongest()];
+                let parent = |bone: usize| skeleton.bones[bone].parent;
+                total += 1;
+                same += usize::from(a == b);
+                near += usize::from(
+                    a == b || parent(a) == Some(b) || parent(b) == Some(a) || parent(a) == parent(b),
+                );
+                assert_eq!(
+                    base.points[i as usize][0] > 0.0,
+                    other.points[j as usize][0] > 0.0,
+                    "{name}: sides"
+                );
+            }
+            assert!(same * 100 > 85 * total, "{name}: {same} of {total} landmarks are on the same bone");
+            assert!(
+                near * 1000 > 990 * total,
+                "{name}: {near} of {total} landmarks are on the bone or next to it"
+            );
+        }
+    }
+}
+
+#[test]
+fn base_body_has_its_landmarks_where_they_were_chosen() {
+    for family in Family::ALL {
+        let base = family.species().find(|s| s.name() == "dog").or(family.species().next()).unwrap();
+        let template = Template::new(base, 0);
+        // A dog is the base itself; a man's proportions differ from it by a few per cent.
+        let chosen = &family.landmarks().points;
+        for (i, p) in chosen.iter().enumerate() {
+            let vertex = template.landmarks[2 * i];
+            assert_ne!(vertex, UNMATCHED, "landmark {i}");
+            let distance = vec3::distance(*p, template.points[vertex as usize]);
+            let limit = if base.name() == "dog" { 0.1 * template.recipe.cell } else { 0.03 };
+            assert!(distance < limit, "{} landmark {i} is {distance} away", base.name());
+        }
+    }
+}
+
+#[test]
+fn symmetric_individuals_are_their_own_mirror_image() {
+    for name in ["woman", "teddy", "cow", "panther"] {
+        let species = species(name);
+        let template = Template::new(species, 1);
+        let seed = (0..).find(|&seed| Stance::of(species, seed) == Stance::Symmetric).unwrap();
+        let points = template.unturned(seed);
+        for (i, p) in points.iter().enumerate() {
+            let distance = vec3::distance(mirrored(*p), points[template.twins[i] as usize]);
+            assert!(distance < 1e-12, "{name}: vertex {i} is {distance} from the mirror image of its twin");
+        }
+        let pairs = template.landmarks.as_chunks::<2>().0.iter();
+        assert!(pairs.filter(|[i, _]| *i != UNMATCHED).all(|&[i, j]| template.twins[i as usize] == j));
+    }
+    let stances: Vec<Stance> = (0..400).map(|seed| Stance::of(species("man"), seed)).collect();
+    let count = |stance: Stance| stances.iter().filter(|&&s| s == stance).count();
+    assert!(count(Stance::Symmetric) > 25 && count(Stance::Resting) > 25 && count(Stance::Posed) > 250);
+}
+
+#[test]
+fn individuals_are_spheres_with_good_triangles() {
+    for name in ["woman", "ape", "horse"] {
+        let template = Template::new(species(name), 1);
+        for seed in 0..4 {
+            let body = template.body(seed, &SynthOptions::default()).unwrap();
+            let name = format!("{name} {seed}");
+            assert_closed_manifold_sphere(&body.mesh, &name);
+            assert!((5000..=7000).contains(&body.mesh.n_vertices()), "{name}: {}", body.mesh.n_vertices());
+            assert!(volume(&body.mesh) > 0.0, "{name}: looks inwards");
+            let thinnest = (0..body.mesh.n_faces()).map(|f| shape_quality(&body.mesh, f)).fold(1.0, f64::min);
+            assert!(thinnest > 0.02, "{name}: a triangle has quality {thinnest}");
+        }
+    }
+}
+
+/// 1 for an equilateral triangle, 0 for a degenerate one.
+fn shape_quality(mesh: &Mesh, face: usize) -> f64 {
+    let [a, b, c] = mesh.corners(face);
+    let squares: f64 = [(a, b), (b, c), (c, a)].iter().map(|&(p, q)| vec3::distance(p, q).powi(2)).sum();
+    2.0 * 3f64.sqrt() * vec3::norm(mesh.face_cross(face)) / squares
+}
+
+#[test]
+fn same_seed_same_bytes_whatever_the_threads() {
+    let make = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = SynthOptions { holes: 2, cuts: 1, noise: 0.05, ..SynthOptions::default() };
+        pool.install(|| Template::new(species("cat"), 1).body(7, &options).unwrap())
+    };
+    let (one, three) = (make(1), make(3));
+    assert_eq!(one.mesh, three.mesh);
+    assert_eq!((one.landmarks, one.template_vertices), (three.landmarks, three.template_vertices));
+}
+
+#[test]
+fn other_seed_other_body_and_other_order() {
+    let template = Template::new(species("dog"), 1);
+    let [a, b] = [1, 2].map(|seed| template.body(seed, &SynthOptions::default()).unwrap());
+    let same = a.landmarks.iter().zip(&b.landmarks).filter(|(i, j)| i == j).count();
+    assert!(same < 20, "{same} landmarks have the same index");
+    // Of the edges between landmarks, few should be in both meshes, or connectivity would tell the map.
+    let edges = |body: &Body| -> std::collections::HashSet<(u32, u32)> {
+        let place = |i: u32| body.template_vertices[i as usize];
+        edge_counts(&body.mesh).into_keys().map(|(i, j)| (place(i), place(j))).collect()
+    };
+    let (first, second) = (edges(&a), edges(&b));
+    let share = first.intersection(&second).count() as f64 / first.len() as f64;
+    assert!(share < 0.35, "{share} of the edges are the same");
+}
+
+/// Where a landmark is on the surface at rest does not depend on the individual; where it is on the body depends on the pose alone.
+#[test]
+fn landmarks_are_the_same_template_points_in_every_pose() {
+    let template = Template::new(species("child"), 1);
+    let [a, b] = [3, 4].map(|seed| template.body(seed, &SynthOptions::default()).unwrap());
+    let posed = template.individual(3);
+    for ((&i, &j), &vertex) in a.landmarks.iter().zip(&b.landmarks).zip(&template.landmarks) {
+        if vertex == UNMATCHED {
+            assert_eq!([i, j], [UNMATCHED; 2]);
+        } else {
+            assert_eq!(a.template_vertices[i as usize], vertex);
+            assert_eq!(b.template_vertices[j as usize], vertex);
+            let posed = posed[vertex as usize];
+            assert_eq!(a.mesh.vertices()[i as usize], posed);
+        }
+    }
+}
+
+#[test]
+fn bodies_keep_most_lengths_in_every_pose() {
+    for name in ["man", "bear"] {
+        let template = Template::new(species(name), 1);
+        let rest = template.rest_mesh();
+        let mut stretches = Vec::new();
+        for seed in 0..6 {
+            let posed = template.individual(seed);
+            let area = Mesh::new(posed.clone(), rest.faces().to_vec()).unwrap().area();
+            let size = (area / rest.area()).sqrt();
+            for &[a, b, c] in rest.faces() {
+                for (i, j) in [(a, b), (b, c), (c, a)] {
+                    let (i, j) = (i as usize, j as usize);
+                    let before = vec3::distance(rest.vertices()[i], rest.vertices()[j]);
+                    stretches.push((vec3::distance(posed[i], posed[j]) / (size * before)).ln().abs());
+                }
+            }
+        }
+        stretches.sort_by(f64::total_cmp);
+        let quantile = |q: f64| stretches[(q * (stretches.len() - 1) as f64) as usize];
+        assert!(quantile(0.5) < 0.1, "{name}: median stretch {}", quantile(0.5));
+        assert!(quantile(0.95) < 0.45, "{name}: 95 % stretch {}", quantile(0.95));
+    }
+}
+
+#[test]
+fn damage_opens_the_surface_and_marks_what_is_missing() {
+    let template = Template::new(species("man"), 1);
+    let whole = template.body(5, &SynthOptions::default()).unwrap();
+    let options = SynthOptions { holes: 3, cuts: 1, noise: 0.1, ..SynthOptions::default() };
+    let part = template.body(5, &options).unwrap();
+    assert!(part.mesh.n_vertices() < whole.mesh.n_vertices());
+    let counts = edge_counts(&part.mesh);
+    assert!(counts.keys().any(|&(a, b)| !counts.contains_key(&(b, a))), "no border");
+    let missing = part.landmarks.iter().filter(|&&i| i == UNMATCHED).count();
+    assert!(missing > 10, "only {missing} landmarks are missing");
+    for &i in part.landmarks.iter().filter(|&&i| i != UNMATCHED) {
+        assert!((i as usize) < part.mesh.n_vertices());
+    }
+}
+
+#[test]
+fn options_out_of_range_are_named() {
+    let options = SynthOptions { hole_radius: 0.0, ..SynthOptions::default() };
+    let message = Template::new(species("man"), 0).body(0, &options).unwrap_err().to_string();
+    assert!(message.contains("hole_radius"), "{message}");
+    let folder = tempfile::tempdir().unwrap();
+    let options = DatasetOptions { seed: 1 << 16, ..DatasetOptions::default() };
+    let message = write_dataset(folder.path(), &options, &|_, _| {}).unwrap_err().to_string();
+    assert!(message.contains("seed") && message.contains("0 to 65535"), "{message}");
+}
+
+#[test]
+fn dataset_is_complete_and_its_splits_are_disjoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let species = vec![species("man"), species("slender")];
+    let options = DatasetOptions { species, per_species: 3, validation: 0.3, ..DatasetOptions::default() };
+    let count = std::sync::atomic::AtomicUsize::new(0);
+    write_dataset(folder.path(), &options, &|_, total| {
+        assert_eq!(total, 6);
+        count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    })
+    .unwrap();
+    assert_eq!(count.into_inner(), 6);
+    let manifest = std::fs::read_to_string(folder.path().join("dataset.toml")).unwrap();
+    assert_eq!(manifest.matches("[[shape]]").count(), 6);
+    for (split, times) in [("train", 2), ("validation", 1), ("test", 3)] {
+        assert_eq!(manifest.matches(&format!("split = \"{split}\"")).count(), times, "{split}");
+    }
+    let vts = std::fs::read_to_string(folder.path().join("man/man_000.vts")).unwrap();
+    assert_eq!(vts.lines().count(), 2 * Family::Biped.landmarks().points.len());
+    assert_eq!(manifest.matches("group = \"biped\"").count(), 6);
+    assert!(folder.path().join("slender/slender_002.ply").exists());
+}
