@@ -5,9 +5,8 @@ use crate::network::Network;
 use crate::precompute::PreparedShape;
 use candle_core::{Device, Tensor};
 use fmnet::Matrix;
-use fmnet::fmap::{FmapSolver, functional_map};
+use fmnet::fmap::{FmapSolver, functional_maps};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::point_map::{Comparison, recover_by};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 
@@ -87,8 +86,8 @@ impl<'a> Validation<'a> {
         let f = basis_source.project(&descriptors(network, &s.shape.shot)?);
         let g = basis_target.project(&descriptors(network, &t.shape.shot)?);
         let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
-        let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
-        let map = recover_by(Comparison::suiting(solver), &map, &basis_source, &basis_target)?;
+        let (maps, _) = functional_maps(&basis_source, &basis_target, &f, &g, solver)?;
+        let map = maps.point_map(solver.comparison(), &basis_source, &basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))
             .filter(|&(&a, &b)| a != MISSING && b != MISSING)
             .map(|(&a, &b)| (a, b))
