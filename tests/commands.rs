@@ -203,7 +203,9 @@ fn a_texture_and_values_are_carried_over() {
 fn features_take_no_options_of_matching() {
     let work = Workplace::new();
     work.mesh("a.off", &bumpy_sphere(2, 1));
-    for option in [["--refine", "icp"], ["--upscale", "l21"], ["--fm", "two-way"], ["--mask-weight", "0.1"]] {
+    for option in
+        [["--refine", "icp"], ["--upscale", "l21"], ["--fm", "bidirectional"], ["--mask-weight", "0.1"]]
+    {
         let message = work.fail(&[&["features", "a.off", "--out", "f"][..], &option].concat(), 2);
         assert!(message.contains(option[0]), "{message}");
     }

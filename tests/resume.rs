@@ -4,6 +4,7 @@
 use candle_core::Device;
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::network::{NetworkOptions, ResidualOptions};
 use fmnet_trainer::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::train::{LAST, METRICS, TrainError, train};
 use std::path::Path;
@@ -19,7 +20,7 @@ fn config(data: &Path, out: &Path) -> TrainConfig {
         k: 20,
         points: 80,
         pool: 150,
-        blocks: 2,
+        network: NetworkOptions::Residual(ResidualOptions { blocks: 2, ..ResidualOptions::default() }),
         checkpoint_every: 2,
         validate_every: 3,
         validation_pairs: 1,

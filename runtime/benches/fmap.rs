@@ -90,12 +90,12 @@ fn refine(report: &Report, bases: [&Eigenbasis; 2], hats: [&Matrix; 2]) {
     let (cost, _) =
         least(report.runs(3), || icp(&c, &source, &target, &rounds).expect("a map of the shapes"));
     tell(report, "icp-3-rounds", cost);
-    let paper = ZoomOutOptions { both_ways: false, ..ZoomOutOptions::default() };
+    let paper = ZoomOutOptions { bidirectional: false, ..ZoomOutOptions::default() };
     let samples = ZoomOutOptions { samples: ZoomOutSamples::Farthest(1000), ..paper.clone() };
     for (name, options) in [
         ("zoomout", paper),
         ("zoomout-1000-samples", samples),
-        ("zoomout-both-ways", ZoomOutOptions::default()),
+        ("zoomout-bidirectional", ZoomOutOptions::default()),
     ] {
         let run = || zoomout(&map, bases[0], bases[1], &options).expect("a map of the shapes").map;
         let (cost, refined) = least(report.runs(3), run);

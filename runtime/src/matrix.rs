@@ -90,6 +90,11 @@ impl<T: Copy> Matrix<T> {
         Self { rows: indices.len(), cols: self.cols, data }
     }
 
+    /// The transpose, `[cols, rows]`, copied.
+    pub fn transposed(&self) -> Self {
+        Self::from_fn(self.cols, self.rows, |i, j| self[(j, i)])
+    }
+
     /// The matrix with `f` applied to every entry.
     pub fn map<U: Copy>(&self, f: impl FnMut(T) -> U) -> Matrix<U> {
         Matrix { rows: self.rows, cols: self.cols, data: self.data.iter().copied().map(f).collect() }
@@ -140,5 +145,6 @@ mod tests {
         assert_eq!(m.as_faer()[(2, 1)], m[(2, 1)]);
         assert_eq!(m.first_cols(1).data(), &[0.0, 10.0, 20.0]);
         assert_eq!(m.select_rows(&[2, 0]).data(), &[20.0, 21.0, 0.0, 1.0]);
+        assert_eq!(m.transposed().data(), &[0.0, 10.0, 20.0, 1.0, 11.0, 21.0]);
     }
 }

@@ -13,10 +13,10 @@ use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
-use crate::fmap::{FmapInfo, FmapSolver, functional_map};
+use crate::fmap::{FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
-use crate::point_map::{Comparison, PointMap, recover_by};
+use crate::point_map::PointMap;
 use crate::refine::{IcpOptions, PmfHints, PmfInfo, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
@@ -315,10 +315,10 @@ impl Matcher {
     ) -> Result<Match, Error> {
         let (basis_source, basis_target) = (source.shape.unit_basis(self.k), target.shape.unit_basis(self.k));
         let solver = if source.shape.whole_area.is_some() { self.part_solver } else { self.solver };
-        let (functional_map, functional_map_info) = timed(observer, pair, "functional map", || {
+        let (maps, functional_map_info) = timed(observer, pair, "functional map", || {
             let (f, g) =
                 (basis_source.project(&source.descriptors), basis_target.project(&target.descriptors));
-            functional_map(&basis_source, &basis_target, &f, &g, solver)
+            functional_maps(&basis_source, &basis_target, &f, &g, solver)
         })?;
         if functional_map_info.rank < self.k {
             observer(Event::Warning(format!(
@@ -333,13 +333,13 @@ impl Matcher {
         );
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
         let raw = timed(observer, pair, "point map", || {
-            recover_by(Comparison::suiting(solver), &functional_map, &basis_source, &basis_target)
+            maps.point_map(solver.comparison(), &basis_source, &basis_target)
         })?;
-        let (map, pmf_info) = self.refine(source, target, &functional_map, raw, pair, observer)?;
+        let (map, pmf_info) = self.refine(source, target, &maps.forth, raw, pair, observer)?;
         drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
-        Ok(Match { map, functional_map, functional_map_info, pmf_info, upscale_info })
+        Ok(Match { map, functional_map: maps.forth, functional_map_info, pmf_info, upscale_info })
     }
 
     fn refine(

@@ -373,6 +373,9 @@ impl TrainConfig {
     /// The solver in the runtime's terms.
     pub fn runtime_solver(&self) -> FmapSolver {
         match self.solver {
+            SolverKind::Regularized if self.diffusion().is_some() => {
+                FmapSolver::Joint { weight: self.mask_weight }
+            }
             SolverKind::LeastSquares => FmapSolver::LeastSquares,
             SolverKind::Regularized => FmapSolver::Regularized { weight: self.mask_weight },
         }

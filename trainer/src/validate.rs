@@ -12,9 +12,8 @@ use fmnet::Matrix;
 use fmnet::cache::Cache;
 use fmnet::diffusion_net::Operators;
 use fmnet::events::Event;
-use fmnet::fmap::{FmapSolver, functional_map};
+use fmnet::fmap::{FmapSolver, functional_maps};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::point_map::{Comparison, recover_by};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use std::collections::{BTreeMap, BTreeSet};
@@ -118,8 +117,8 @@ impl Validation {
         let g = basis_target.project(&descriptors(network, &target.input)?);
         let solver = config.runtime_solver().for_matching();
         let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
-        let (map, _) = functional_map(&basis_source, &basis_target, &f, &g, solver)?;
-        let map = recover_by(Comparison::suiting(solver), &map, &basis_source, &basis_target)?;
+        let (maps, _) = functional_maps(&basis_source, &basis_target, &f, &g, solver)?;
+        let map = maps.point_map(solver.comparison(), &basis_source, &basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))
             .filter(|&(&a, &b)| a != MISSING && b != MISSING)
             .map(|(&a, &b)| (a, b))

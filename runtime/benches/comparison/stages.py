@@ -50,7 +50,7 @@ BENCHES = {
         "Functional map, point map, refinement",
         "Two generated people of 6890 vertices with learned descriptors: the functional map of k eigenfunctions by least squares "
         "and with the resolvent mask; the point map at k = 120; ZoomOut from 60 to 200 eigenfunctions in steps of 20, one way as in the paper "
-        "and pyFM, and both ways as `match` does. pyFM's own fit of a functional map minimises another energy and is not compared.",
+        "and pyFM, and bidirectional as `match` does. pyFM's own fit of a functional map minimises another energy and is not compared.",
         True, 20_000,
     ),
     "geodesic": Stage(

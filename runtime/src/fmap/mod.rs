@@ -6,29 +6,30 @@
 //! [`FmapSolver`].
 
 mod adjoint;
+mod both;
 mod dense;
 mod least_squares;
 mod part;
 mod points;
 mod regularized;
 mod soft;
-mod two_way;
 
 use crate::Matrix;
+use crate::point_map::Comparison;
 use crate::spectral::Eigenbasis;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use adjoint::functional_map_of;
+pub use both::{BothMaps, bidirectional, both_maps, functional_maps};
 pub use least_squares::{LeastSquaresOptions, least_squares};
 pub use part::part;
 pub use points::{from_points, pseudo_inverse};
 pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
 pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
-pub use two_way::two_way;
 
+pub(crate) use both::mean_with_transpose;
 pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
-pub(crate) use two_way::mean_with_transpose;
 
 /// How a functional map is computed from descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,9 +44,17 @@ pub enum FmapSolver {
         /// connectivities.
         weight: f64,
     },
-    /// The mean of the regularised solves of both directions, [`two_way`].
-    TwoWay {
-        /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::TWO_WAY_WEIGHT`].
+    /// The mean of the regularised solves of both directions, [`bidirectional`]. Models of earlier versions call it
+    /// `two-way`.
+    #[serde(alias = "two-way")]
+    Bidirectional {
+        /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::BIDIRECTIONAL_WEIGHT`].
+        weight: f64,
+    },
+    /// The regularised solves of both directions, both kept, [`functional_maps`]: vertices are compared in the
+    /// [`crate::point_map::JointEmbedding`].
+    Joint {
+        /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
         weight: f64,
     },
     /// For a source that is a part of the target, with bases in one unit: the transpose of the regularised solve from the
@@ -59,14 +68,14 @@ pub enum FmapSolver {
 impl FmapSolver {
     /// The weight of the mask that models are trained with.
     pub const DEFAULT_MASK_WEIGHT: f64 = 0.1;
-    /// The weight of the mask where both directions are solved.
-    pub const TWO_WAY_WEIGHT: f64 = 0.03;
+    /// The weight of the mask where the mean of both directions is taken.
+    pub const BIDIRECTIONAL_WEIGHT: f64 = 0.03;
 
     /// What to match with, given what the network was trained with: both directions where it was the regularised solve. The
     /// paper's least squares stay what they are.
     pub fn for_matching(self) -> Self {
         match self {
-            Self::Regularized { .. } => Self::TwoWay { weight: Self::TWO_WAY_WEIGHT },
+            Self::Regularized { .. } => Self::Bidirectional { weight: Self::BIDIRECTIONAL_WEIGHT },
             other => other,
         }
     }
@@ -77,8 +86,17 @@ impl FmapSolver {
     pub fn for_part(chosen: Option<Self>) -> Self {
         match chosen {
             None => Self::Part { weight: Self::DEFAULT_MASK_WEIGHT },
-            Some(Self::TwoWay { weight }) => Self::Part { weight },
+            Some(Self::Bidirectional { weight } | Self::Joint { weight }) => Self::Part { weight },
             Some(other) => other,
+        }
+    }
+
+    /// How points are compared by the maps that [`functional_maps`] gives for this solver.
+    pub fn comparison(self) -> Comparison {
+        match self {
+            Self::Bidirectional { .. } => Comparison::Adjoint,
+            Self::Joint { .. } => Comparison::Joint,
+            Self::LeastSquares | Self::Regularized { .. } | Self::Part { .. } => Comparison::Distance,
         }
     }
 }
@@ -90,8 +108,11 @@ pub enum SolverKind {
     LeastSquares,
     /// With the resolvent mask, from the source to the target.
     Regularized,
-    /// With the resolvent mask, both directions.
-    TwoWay,
+    /// With the resolvent mask, the mean of both directions.
+    #[value(alias = "two-way")]
+    Bidirectional,
+    /// With the resolvent mask, both directions beside each other.
+    Joint,
     /// With the resolvent mask, from the target to the source, which is a part of it.
     Part,
 }
@@ -101,11 +122,12 @@ impl FmapSolver {
     /// neither, `None`.
     pub fn chosen(kind: Option<SolverKind>, mask_weight: Option<f64>) -> Option<Self> {
         let weight = |default| mask_weight.unwrap_or(default);
-        let kind = kind.or(mask_weight.map(|_| SolverKind::TwoWay))?;
+        let kind = kind.or(mask_weight.map(|_| SolverKind::Bidirectional))?;
         Some(match kind {
             SolverKind::LeastSquares => Self::LeastSquares,
             SolverKind::Regularized => Self::Regularized { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
-            SolverKind::TwoWay => Self::TwoWay { weight: weight(Self::TWO_WAY_WEIGHT) },
+            SolverKind::Bidirectional => Self::Bidirectional { weight: weight(Self::BIDIRECTIONAL_WEIGHT) },
+            SolverKind::Joint => Self::Joint { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
             SolverKind::Part => Self::Part { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
         })
     }
@@ -115,7 +137,7 @@ impl FmapSolver {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FmapInfo {
     /// Number of independent directions kept in the worst conditioned system, at most the number of eigenfunctions on the
-    /// side solved from: `k_source`, for a part `k_target`, for both ways the smaller.
+    /// side solved from: `k_source`, for a part `k_target`, for both directions the smaller.
     pub rank: usize,
     /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of
     /// `F^`, infinite where `F^` has linearly dependent rows; for the regularised solve a lower bound, from
@@ -216,6 +238,7 @@ pub enum FmapError {
 /// `[k_source, q]`, to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
 ///
 /// The mask takes eigenvalues relative to each shape's own area; for [`FmapSolver::Part`] as they are, in one unit of both.
+/// For [`FmapSolver::Joint`] it is the map from the source to the target alone; [`functional_maps`] gives both.
 ///
 /// # Errors
 /// If the arrays do not fit together, are empty or not finite, the weight is out of range, or a decomposition fails.
@@ -230,11 +253,13 @@ pub fn functional_map(
     check_length("a column of the target's coefficients", g_hat.rows(), basis_target.k())?;
     match solver {
         FmapSolver::LeastSquares => least_squares(f_hat, g_hat, &LeastSquaresOptions::default()),
-        FmapSolver::Regularized { weight } | FmapSolver::TwoWay { weight } => {
-            let by = if matches!(solver, FmapSolver::TwoWay { .. }) { two_way } else { regularized };
-            let eigenvalues_source = scale_free_eigenvalues(basis_source);
-            let eigenvalues_target = scale_free_eigenvalues(basis_target);
-            by(f_hat, g_hat, &eigenvalues_source, &eigenvalues_target, weight)
+        FmapSolver::Regularized { weight } | FmapSolver::Joint { weight } => {
+            let [source, target] = [basis_source, basis_target].map(scale_free_eigenvalues);
+            regularized(f_hat, g_hat, &source, &target, weight)
+        }
+        FmapSolver::Bidirectional { weight } => {
+            let [source, target] = [basis_source, basis_target].map(scale_free_eigenvalues);
+            bidirectional(f_hat, g_hat, &source, &target, weight)
         }
         FmapSolver::Part { weight } => {
             part(f_hat, g_hat, &basis_source.eigenvalues, &basis_target.eigenvalues, weight)

@@ -2,7 +2,6 @@
 
 use super::{FmapError, FmapInfo, regularized};
 use crate::Matrix;
-use crate::point_map::transposed;
 
 /// The functional map `C`, `[k_target, k_source]`, where the source is a part of the target.
 ///
@@ -23,5 +22,5 @@ pub fn part(
     weight: f64,
 ) -> Result<(Matrix, FmapInfo), FmapError> {
     let (back, info) = regularized(g_hat, f_hat, eigenvalues_target, eigenvalues_source, weight)?;
-    Ok((transposed(&back), info))
+    Ok((back.transposed(), info))
 }

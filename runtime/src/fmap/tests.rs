@@ -15,10 +15,6 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     multiply(a.as_faer(), b.as_faer())
 }
 
-fn transposed(a: &Matrix) -> Matrix {
-    Matrix::from_fn(a.cols(), a.rows(), |i, j| a[(j, i)])
-}
-
 fn solve(f: &Matrix, g: &Matrix) -> (Matrix, FmapInfo) {
     least_squares(f, g, &LeastSquaresOptions::default()).unwrap()
 }
@@ -37,16 +33,16 @@ fn same_descriptors_give_the_identity() {
 }
 
 #[test]
-fn both_ways_is_its_own_transpose_and_nearer_to_the_truth() {
+fn the_bidirectional_map_is_its_own_transpose_and_nearer_to_the_truth() {
     let (source, target) = (rectangle(12, 15, 20), rectangle(12, 15, 20));
     let f = random(20, 60, 1);
     let noise = random(20, 60, 2);
     let g = Matrix::from_fn(20, 60, |i, j| sign(i) * (f[(i, j)] + 0.4 * noise[(i, j)]));
     let truth = Matrix::from_fn(20, 20, |i, j| if i == j { sign(i) } else { 0.0 });
-    let both = FmapSolver::TwoWay { weight: 0.01 };
+    let both = FmapSolver::Bidirectional { weight: 0.01 };
     let (c, info) = functional_map(&source, &target, &f, &g, both).unwrap();
     let (back, _) = functional_map(&target, &source, &g, &f, both).unwrap();
-    assert_close(&back, &transposed(&c), 1e-12);
+    assert_close(&back, &c.transposed(), 1e-12);
     assert!(info.rank == 20 && info.relative_residual > 0.0 && info.relative_residual < 1.0);
     let one = FmapSolver::Regularized { weight: 0.01 };
     let (forth, _) = functional_map(&source, &target, &f, &g, one).unwrap();
@@ -55,11 +51,48 @@ fn both_ways_is_its_own_transpose_and_nearer_to_the_truth() {
 }
 
 #[test]
-fn a_weight_alone_means_both_ways() {
+fn a_weight_alone_means_bidirectional() {
     assert_eq!(FmapSolver::chosen(None, None), None);
-    assert_eq!(FmapSolver::chosen(None, Some(0.2)), Some(FmapSolver::TwoWay { weight: 0.2 }));
+    assert_eq!(FmapSolver::chosen(None, Some(0.2)), Some(FmapSolver::Bidirectional { weight: 0.2 }));
     assert_eq!(FmapSolver::chosen(Some(SolverKind::Regularized), None), Some(REGULARIZED));
     assert_eq!(FmapSolver::chosen(Some(SolverKind::LeastSquares), Some(1.0)), Some(FmapSolver::LeastSquares));
+}
+
+#[test]
+fn maps_of_both_directions_meet_their_equations() {
+    let (source, target) = (rectangle(12, 15, 18), rectangle(14, 13, 16));
+    let (f, g) = (random(18, 40, 31), random(16, 40, 32));
+    let joint = FmapSolver::Joint { weight: 0.1 };
+    let (maps, info) = functional_maps(&source, &target, &f, &g, joint).unwrap();
+    let (forth, info_forth) = functional_map(&source, &target, &f, &g, REGULARIZED).unwrap();
+    let (back, info_back) = functional_map(&target, &source, &g, &f, REGULARIZED).unwrap();
+    assert_eq!((&maps.forth, &maps.back), (&forth, &back));
+    assert_eq!(info.relative_residual, info_forth.relative_residual.max(info_back.relative_residual));
+    let bidirectional = FmapSolver::Bidirectional { weight: 0.1 };
+    let (mean, _) = functional_maps(&source, &target, &f, &g, bidirectional).unwrap();
+    assert_eq!(mean, BothMaps::with_adjoint(maps.mean()));
+    assert_eq!(functional_map(&source, &target, &f, &g, joint).unwrap().0, maps.forth);
+}
+
+#[test]
+fn functional_maps_of_point_maps_pull_functions_back() {
+    let basis = rectangle(40, 50, 20);
+    let order = shuffle(2000);
+    let target = reordered(&basis, &order);
+    let mut forth = vec![0; 2000];
+    order.iter().enumerate().for_each(|(y, &x)| forth[x as usize] = y as u32);
+    let (forth, back) = (PointMap::new(forth, 2000), PointMap::new(order, 2000));
+    let maps = BothMaps::of([&forth, &back], &basis, &target).unwrap();
+    assert_close(&maps.forth, &identity(20), 1e-12);
+    assert_close(&maps.back, &identity(20), 1e-12);
+    // A constant map from the source to the target pulls every function back to a constant one.
+    let constant = PointMap::new(vec![7; 2000], 2000);
+    let maps = BothMaps::of([&constant, &back], &basis, &target).unwrap();
+    let area = basis.area().sqrt();
+    let expected =
+        Matrix::from_fn(20, 20, |i, j| if i == 0 { area * target.eigenvectors[(7, j)] } else { 0.0 });
+    assert_close(&maps.back, &expected, 1e-12);
+    assert_close(&maps.forth, &identity(20), 1e-12);
 }
 
 #[test]
@@ -73,7 +106,7 @@ fn least_squares_recovers_a_map_and_meets_the_normal_equations() {
         let image = product(&c, &f);
         image.data().iter().zip(g.data()).map(|(a, b)| a - b).collect()
     });
-    assert_close(&product(&residual, &transposed(&f)), &Matrix::zeros(11, 15), 1e-11);
+    assert_close(&product(&residual, &f.transposed()), &Matrix::zeros(11, 15), 1e-11);
     assert!(info.relative_residual > 0.1 && info.relative_residual < 1.0);
 }
 
@@ -109,9 +142,9 @@ fn regularized_rows_meet_their_equation() {
     let weight = 0.3;
     let (c, _) = functional_map(&source, &target, &f, &g, FmapSolver::Regularized { weight }).unwrap();
     let mask = resolvent_mask(&scale_free_eigenvalues(&source), &scale_free_eigenvalues(&target));
-    let gram = product(&f, &transposed(&f));
+    let gram = product(&f, &f.transposed());
     let mean = (0..18).map(|i| gram[(i, i)]).sum::<f64>() / 18.0;
-    let (left, right) = (product(&c, &gram), product(&g, &transposed(&f)));
+    let (left, right) = (product(&c, &gram), product(&g, &f.transposed()));
     let left = Matrix::from_fn(16, 18, |i, j| left[(i, j)] + weight * mean * mask[(i, j)] * c[(i, j)]);
     assert_close(&left, &right, 1e-11);
 }

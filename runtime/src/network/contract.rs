@@ -165,7 +165,8 @@ impl ModelMetadata {
         let (solver, mask_weight) = match self.solver {
             FmapSolver::LeastSquares => ("least-squares", 0.0),
             FmapSolver::Regularized { weight } => ("regularized", weight),
-            FmapSolver::TwoWay { weight } => ("two-way", weight),
+            FmapSolver::Bidirectional { weight } => ("bidirectional", weight),
+            FmapSolver::Joint { weight } => ("joint", weight),
             FmapSolver::Part { weight } => ("part", weight),
         };
         let pairs = [
@@ -197,11 +198,13 @@ impl ModelMetadata {
         let solver = match pairs.text("solver")? {
             "least-squares" => FmapSolver::LeastSquares,
             "regularized" => FmapSolver::Regularized { weight: pairs.value("mask_weight")? },
-            "two-way" => FmapSolver::TwoWay { weight: pairs.value("mask_weight")? },
+            "bidirectional" | "two-way" => FmapSolver::Bidirectional { weight: pairs.value("mask_weight")? },
+            "joint" => FmapSolver::Joint { weight: pairs.value("mask_weight")? },
             "part" => FmapSolver::Part { weight: pairs.value("mask_weight")? },
             other => {
                 return Err(pairs.contract(format!(
-                    "{PREFIX}solver is {other:?}, but must be least-squares, regularized, two-way or part; export the model anew"
+                    "{PREFIX}solver is {other:?}, but must be least-squares, regularized, \
+                     bidirectional, joint or part; export the model anew"
                 )));
             }
         };
@@ -241,7 +244,8 @@ impl ModelMetadata {
             return wrong("shot_bins", &self.shot.bins, "10");
         }
         if let FmapSolver::Regularized { weight }
-        | FmapSolver::TwoWay { weight }
+        | FmapSolver::Bidirectional { weight }
+        | FmapSolver::Joint { weight }
         | FmapSolver::Part { weight } = self.solver
             && !(weight.is_finite() && weight >= 0.0)
         {

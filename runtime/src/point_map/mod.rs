@@ -1,10 +1,12 @@
 //! From a functional map to a point map: exact nearest neighbours in the spectral embedding.
 
+mod joint;
 mod recover;
 pub mod search;
 mod types;
 
+pub use joint::JointEmbedding;
 pub use recover::{Comparison, RecoverError, recover, recover_by};
 pub use types::PointMap;
 
-pub(crate) use recover::{check_shape, cosines, recover_transported, transport, transposed};
+pub(crate) use recover::{check_shape, cosines, recover_transported, transport};

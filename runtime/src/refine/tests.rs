@@ -53,7 +53,8 @@ fn zoomout_improves_a_small_correct_map() {
     assert!(share_exact(&coarse) < 0.5, "{}", share_exact(&coarse));
     let options = zoomout_options(ZoomOutSamples::All);
     let one_way =
-        zoomout(&coarse, &basis, &basis, &ZoomOutOptions { both_ways: false, ..options.clone() }).unwrap();
+        zoomout(&coarse, &basis, &basis, &ZoomOutOptions { bidirectional: false, ..options.clone() })
+            .unwrap();
     assert!(share_exact(&one_way.map) > 0.95, "{}", share_exact(&one_way.map));
     let refined = zoomout(&coarse, &basis, &basis, &options).unwrap();
     assert!(share_exact(&refined.map) > 0.95, "{}", share_exact(&refined.map));

@@ -130,7 +130,7 @@ pub fn l21_functional_map(
         balance(&mut rho, &info, &mut multipliers);
     }
     info.objective = l21_distance(&fitted, psi);
-    Ok((transposed(&map), info))
+    Ok((map.transposed(), info))
 }
 
 struct SplitStep {
@@ -253,10 +253,6 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     result
 }
 
-pub(super) fn transposed(a: &Matrix) -> Matrix {
-    Matrix::from_fn(a.cols(), a.rows(), |i, j| a[(j, i)])
-}
-
 fn combine(psi: &Matrix, split: &Matrix, multipliers: &Matrix) -> Matrix {
     let terms = psi.data().iter().zip(split.data()).zip(multipliers.data());
     Matrix::from_vec(psi.rows(), psi.cols(), terms.map(|((y, z), u)| y + z - u).collect())
@@ -293,7 +289,7 @@ mod tests {
     /// Matches of a known map, the first `wrong` of them replaced by random ones.
     fn problem(wrong: usize) -> (Matrix, Matrix, Matrix) {
         let (phi, c) = (random(400, 12, 1), random(10, 12, 2));
-        let mut psi = product(&phi, &transposed(&c));
+        let mut psi = product(&phi, &c.transposed());
         let noise = random(wrong, 10, 3);
         for j in 0..wrong {
             psi.row_mut(j).copy_from_slice(noise.row(j));
@@ -327,7 +323,7 @@ mod tests {
         let options = AdmmOptions { max_iterations: 5000, tolerance: 1e-9 };
         let (c, info) = l21_functional_map(&phi, &psi, &options).unwrap();
         assert!(info.converged && info.objective <= info.initial_objective, "{info:?}");
-        let residual = difference(&product(&phi, &transposed(&c)), &psi);
+        let residual = difference(&product(&phi, &c.transposed()), &psi);
         for i in 0..6 {
             for t in 0..5 {
                 let slope: f64 =

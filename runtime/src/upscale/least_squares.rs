@@ -1,6 +1,6 @@
 //! The plain least-squares functional map between matched points, for comparison with the robust one.
 
-use super::l21_admm::{PseudoInverse, UpscaleError, transposed};
+use super::l21_admm::{PseudoInverse, UpscaleError};
 use crate::Matrix;
 
 /// `C`, `[k_target, k_source]`, that minimises `sum_j || C phi(x_j) - psi(y_j) ||^2` over matches `j`.
@@ -11,5 +11,5 @@ use crate::Matrix;
 /// As [`super::l21_functional_map`].
 pub fn least_squares_functional_map(phi: &Matrix, psi: &Matrix) -> Result<Matrix, UpscaleError> {
     let solver = PseudoInverse::new(phi, psi)?;
-    Ok(transposed(&solver.solve(psi)))
+    Ok(solver.solve(psi).transposed())
 }

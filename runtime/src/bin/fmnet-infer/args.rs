@@ -84,10 +84,10 @@ pub(crate) struct ShapeArgs {
 pub(crate) struct PipelineArgs {
     #[command(flatten)]
     pub(crate) shape: ShapeArgs,
-    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
+    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with SHOT]
     #[arg(long, value_enum)]
     pub(crate) fm: Option<SolverKind>,
-    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
+    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 for bidirectional, else 0.1]
     #[arg(long, value_parser = non_negative)]
     pub(crate) mask_weight: Option<f64>,
     /// Refinement of the map [default: zoomout; none with SHOT]

@@ -25,7 +25,7 @@ mod triangulation;
 
 use super::{RefineError, Refined, check_bases};
 use crate::fmap::functional_map_of;
-use crate::point_map::{PointMap, cosines, transport, transposed};
+use crate::point_map::{PointMap, cosines, transport};
 use crate::spectral::Eigenbasis;
 use crate::{Matrix, Mesh};
 use assignment::{Assigner, DescriptorTerm};
@@ -219,7 +219,7 @@ fn heat_average(
     let mut averages = transport(&basis_source.eigenvectors, &scaled(&c, &heat));
     let is_matched = |x: usize, _| if targets[x] == PointMap::UNMATCHED { 0.0 } else { 1.0 };
     let matched = basis_source.project(&Matrix::from_fn(basis_source.n(), 1, is_matched));
-    let share = transport(&basis_source.eigenvectors, &scaled(&transposed(&matched), &heat));
+    let share = transport(&basis_source.eigenvectors, &scaled(&matched.transposed(), &heat));
     for x in 0..averages.rows() {
         // A vertex far from every match has nothing to average.
         let share = share[(x, 0)].max(0.05);

@@ -244,10 +244,10 @@ pub(crate) struct EvaluateArgs {
     /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Solver of the functional map [default: two-way, or what the model was trained with; least-squares with SHOT]
+    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with SHOT]
     #[arg(long, value_enum)]
     pub(crate) fm: Option<SolverKind>,
-    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 both ways, 0.1 one way]
+    /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 for bidirectional, else 0.1]
     #[arg(long)]
     pub(crate) mask_weight: Option<f64>,
     /// Curves of others to draw beside: a header `threshold,NAME,...`, then percentages

@@ -108,7 +108,8 @@ pub(super) fn triangulate(
             let start = start(surface, dense)?;
             let independent = remesh(surface, &metric::even(surface, dense), &start, 3);
             let evenness = 10f64.powf(uniform(rng, -5.0, -2.5));
-            Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?.mesh)
+            Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?
+                .mesh)
         }
         Manner::Marching => marching(surface.mesh, target, rng),
         Manner::Quads => {
@@ -144,7 +145,12 @@ fn marching(mesh: &Mesh, target: usize, rng: &mut ChaCha8Rng) -> Result<Mesh, Si
 
 /// The mesh itself, with some of its edges flipped and its vertices moved along the surface, so that its connectivity gives
 /// nothing away.
-fn shifted(surface: &Surface, mesh: &Mesh, target: usize, rng: &mut ChaCha8Rng) -> Result<Mesh, SimulateError> {
+fn shifted(
+    surface: &Surface,
+    mesh: &Mesh,
+    target: usize,
+    rng: &mut ChaCha8Rng,
+) -> Result<Mesh, SimulateError> {
     let mesh = decimate(mesh, target, &DecimateOptions::default())?.mesh;
     let flips = uniform(rng, 0.1, 0.5);
     let mut places = surface.places(&mesh);

@@ -177,7 +177,10 @@ fn bends(surface: &Surface, topology: &Topology) -> Vec<[f64; 6]> {
         if length > 0.0 {
             for vertex in [i, j] {
                 let term = square(vec3::scale(edge, 1.0 / length));
-                tensors[vertex as usize].iter_mut().zip(term).for_each(|(t, x)| *t += 0.5 * angle * length * x);
+                tensors[vertex as usize]
+                    .iter_mut()
+                    .zip(term)
+                    .for_each(|(t, x)| *t += 0.5 * angle * length * x);
             }
         }
     }

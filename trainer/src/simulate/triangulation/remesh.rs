@@ -154,14 +154,17 @@ impl Work<'_> {
         let points = [a, b, left, right].map(|i| self.sheet.points[i as usize]);
         let metrics = [self.metric(a), self.metric(b)];
         // The angles at the corners opposite the edge, in the metric at its ends.
-        let excess: f64 = metrics.iter().map(|metric| {
-            let [a, b, c, d] = points.map(|p| metric.to_unit(vec3::sub(p, points[0])));
-            let cotangent = |apex: Vec3| {
-                let (u, v) = (vec3::sub(a, apex), vec3::sub(b, apex));
-                vec3::dot(u, v) / vec3::norm(vec3::cross(u, v)).max(f64::MIN_POSITIVE)
-            };
-            cotangent(c) + cotangent(d)
-        }).sum();
+        let excess: f64 = metrics
+            .iter()
+            .map(|metric| {
+                let [a, b, c, d] = points.map(|p| metric.to_unit(vec3::sub(p, points[0])));
+                let cotangent = |apex: Vec3| {
+                    let (u, v) = (vec3::sub(a, apex), vec3::sub(b, apex));
+                    vec3::dot(u, v) / vec3::norm(vec3::cross(u, v)).max(f64::MIN_POSITIVE)
+                };
+                cotangent(c) + cotangent(d)
+            })
+            .sum();
         excess < -1e-9 && flips_flat(points)
     }
 

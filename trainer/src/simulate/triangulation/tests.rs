@@ -145,7 +145,8 @@ fn contacts_grow_together_and_lose_their_points() {
 #[test]
 fn open_surfaces_keep_their_boundary() {
     let mesh = open_half_sphere(4);
-    for manner in [Manner::Isotropic, Manner::Anisotropic, Manner::Quads, Manner::Quadrics, Manner::Marching] {
+    for manner in [Manner::Isotropic, Manner::Anisotropic, Manner::Quads, Manner::Quadrics, Manner::Marching]
+    {
         let options = TriangulationOptions { glued: 1.0, ..whole(manner, 600) };
         let made = made(&mesh, &options, 3);
         assert!(!made.plan.glued && made.plan.manner != Manner::Marching);
