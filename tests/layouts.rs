@@ -6,6 +6,7 @@ use fmnet::Mesh;
 use fmnet::io::{Attributes, write_mesh};
 use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};
 use fmnet_trainer::config::{List, Sampling, TrainConfig};
+use fmnet_trainer::network::{NetworkOptions, ResidualOptions};
 use fmnet_trainer::dataset::{Dataset, Split};
 use fmnet_trainer::events::TrainEvent;
 use fmnet_trainer::simulate::{
@@ -42,7 +43,7 @@ fn config(data: &Path) -> TrainConfig {
         points: 60,
         pool: 400,
         shot_radius: 0.25,
-        blocks: 1,
+        network: NetworkOptions::Residual(ResidualOptions { blocks: 1, ..ResidualOptions::default() }),
         validate_every: 2,
         validation_pairs: 2,
         ..TrainConfig::paper()
