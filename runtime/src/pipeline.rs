@@ -13,11 +13,13 @@ use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
 use crate::events::{Event, Observer, timed};
-use crate::fmap::{FmapInfo, FmapSolver, functional_maps};
+use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
 use crate::network::{Backend, DescriptorNetwork};
 use crate::point_map::PointMap;
-use crate::refine::{IcpOptions, PmfHints, PmfInfo, PmfOptions, ZoomOutOptions, icp, pmf, zoomout};
+use crate::refine::{
+    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletOptions, ZoomOutOptions, icp, pmf, wavelet, zoomout,
+};
 use crate::shape::{Shape, ShapeOptions};
 use crate::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
 use crate::upscale::{
@@ -50,12 +52,16 @@ pub enum Refinement {
     /// ZoomOut (Melzi et al. 2019).
     #[default]
     Zoomout,
+    /// The wavelet filter, coarse to fine, in both directions (Hu, Li, Liu et al. 2021); for whole shapes only.
+    Wavelet,
     /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
-    /// meshes of equally many vertices, injective where the source has fewer. Where both meshes turn out to be triangulated
-    /// alike, as registrations of one template are, the map then follows the triangulation and is exact.
+    /// meshes of equally many vertices, injective where the source has fewer.
+    #[serde(alias = "pmf-geometry")]
+    #[value(alias = "pmf-geometry")]
     Pmf,
-    /// The same by geometry alone: for measuring what the filter does, where the meshes are triangulated alike.
-    PmfGeometry,
+    /// The product manifold filter, then along the triangulation, where both meshes turn out to have the same, as
+    /// registrations of one template do: the map then is exact, whatever the shapes.
+    SharedTriangulation,
 }
 
 /// How the map of decimated meshes becomes one of the full meshes.
@@ -107,7 +113,7 @@ pub struct MatchOptions {
     pub cache: Option<PathBuf>,
 }
 
-/// Eigenfunctions that ZoomOut goes up to and the product manifold filter takes; 500 in the latter gained nothing.
+/// Eigenfunctions that ZoomOut and the wavelet filter go up to and the product manifold filter takes; 500 in the latter gained nothing.
 const REFINED_K: usize = 200;
 /// Eigenfunctions of the full meshes in upscaling.
 const UPSCALE_K: usize = 100;
@@ -186,7 +192,9 @@ impl Matcher {
         let refinement = options.refinement.unwrap_or(default_refinement);
         shape_options.k = match refinement {
             Refinement::None | Refinement::Icp => k,
-            Refinement::Zoomout | Refinement::Pmf | Refinement::PmfGeometry => k.max(REFINED_K),
+            Refinement::Zoomout | Refinement::Wavelet | Refinement::Pmf | Refinement::SharedTriangulation => {
+                k.max(REFINED_K)
+            }
         };
         let default_solver =
             network.as_ref().map_or(FmapSolver::LeastSquares, |n| n.metadata().solver.for_matching());
@@ -335,7 +343,7 @@ impl Matcher {
         let raw = timed(observer, pair, "point map", || {
             maps.point_map(solver.comparison(), &basis_source, &basis_target)
         })?;
-        let (map, pmf_info) = self.refine(source, target, &maps.forth, raw, pair, observer)?;
+        let (map, pmf_info) = self.refine(source, target, &maps, solver, raw, pair, observer)?;
         drop(reserved);
         let (map, upscale_info) = self.upscale(source, target, map, pair, observer)?;
         let map = in_input_vertices(&source.shape, &target.shape, &map);
@@ -346,7 +354,8 @@ impl Matcher {
         &self,
         source: &DescribedShape,
         target: &DescribedShape,
-        functional_map: &Matrix,
+        maps: &BothMaps,
+        solver: FmapSolver,
         raw: PointMap,
         pair: &str,
         observer: Observer,
@@ -363,22 +372,40 @@ impl Matcher {
         Ok(match self.refinement {
             Refinement::None => (raw, None),
             Refinement::Icp => {
-                let refine = || icp(functional_map, &at_k(source), &at_k(target), &IcpOptions::default());
+                let refine = || icp(&maps.forth, &at_k(source), &at_k(target), &IcpOptions::default());
                 (timed(observer, pair, "icp", refine)?.map, None)
             }
             Refinement::Zoomout => (by_zoomout()?.map, None),
-            Refinement::Pmf | Refinement::PmfGeometry => {
+            Refinement::Wavelet => {
+                let (basis_source, basis_target) = (whole(source), whole(target));
+                let options = WaveletOptions {
+                    part: source.shape.whole_area.is_some(),
+                    ..WaveletOptions::between(self.k, basis_source.k().min(basis_target.k()))
+                };
+                let refine = || -> Result<PointMap, Error> {
+                    let back = maps.clone().reversed();
+                    let back = back.point_map(solver.comparison(), &at_k(target), &at_k(source))?;
+                    Ok(wavelet([&raw, &back], &basis_source, &basis_target, &options)?.map)
+                };
+                (timed(observer, pair, "wavelet", refine)?, None)
+            }
+            Refinement::Pmf | Refinement::SharedTriangulation => {
                 let start = by_zoomout()?.map;
                 let meshes = [source.shape.mesh(), target.shape.mesh()];
                 // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
                 let hints = PmfHints {
                     descriptors: Some([&source.shape.shot, &target.shape.shot]),
-                    meshes: (self.refinement == Refinement::Pmf).then_some(meshes),
+                    meshes: (self.refinement == Refinement::SharedTriangulation).then_some(meshes),
                 };
                 let (basis_source, basis_target) = (whole(source), whole(target));
                 let filtered = timed(observer, pair, "pmf", || {
                     pmf(&start, &basis_source, &basis_target, hints, &PmfOptions::default())
                 })?;
+                if self.refinement == Refinement::SharedTriangulation && filtered.info.edges_kept.is_none() {
+                    observer(Event::Warning(format!(
+                        "{pair}: the meshes are not triangulated alike; the map is that of the product manifold filter"
+                    )));
+                }
                 (filtered.map, Some(filtered.info))
             }
         })

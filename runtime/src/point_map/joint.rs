@@ -32,12 +32,8 @@ impl JointEmbedding {
     ) -> Result<Self, RecoverError> {
         check_shape(forth, basis_source, basis_target)?;
         check_shape(back, basis_target, basis_source)?;
-        Ok(Self::of_rows(forth, back, &basis_source.eigenvectors, &basis_target.eigenvectors))
-    }
-
-    /// The embedding of some rows of the eigenvectors, `[m_source, k_source]` and `[m_target, k_target]`.
-    pub(crate) fn of_rows(forth: &Matrix, back: &Matrix, phi: &Matrix, psi: &Matrix) -> Self {
-        Self { source: beside(&transport(phi, forth), phi), target: beside(psi, &transport(psi, back)) }
+        let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
+        Ok(Self { source: beside(&transport(phi, forth), phi), target: beside(psi, &transport(psi, back)) })
     }
 
     /// For each source vertex the nearest target vertex, the lowest of several; the confidence is the cosine of the angle

@@ -1,8 +1,9 @@
-//! Refinement of a map: spectral ICP, ZoomOut, the product manifold filter.
+//! Refinement of a map: spectral ICP, ZoomOut, the wavelet filter, the product manifold filter.
 
 mod icp;
 mod pmf;
 mod sampling;
+mod wavelet;
 mod zoomout;
 
 use crate::Matrix;
@@ -13,6 +14,7 @@ use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
 pub use pmf::{PmfHints, PmfInfo, PmfOptions, pmf};
+pub use wavelet::{RefinedBoth, WaveletInfo, WaveletOptions, WaveletStage, wavelet};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.
@@ -82,6 +84,12 @@ pub enum RefineError {
     NoEigenfunctions {
         /// `source` or `target`.
         side: &'static str,
+    },
+    /// The method is for whole shapes only.
+    #[error("{method} refines maps between whole shapes; refine the map of a part by zoomout, or not at all")]
+    Part {
+        /// The method.
+        method: &'static str,
     },
     /// Not one source vertex has a match to start from.
     #[error("no source vertex is matched; refinement improves a map, it cannot start without one")]

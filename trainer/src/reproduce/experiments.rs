@@ -56,10 +56,15 @@ fn faust_synthetic(settings: &Settings) -> Experiment {
             methods: vec![
                 learned("regularised", regularized, 120, Refinement::None),
                 learned("regularised + ZoomOut", regularized, 120, Refinement::Zoomout),
-                learned("regularised + PMF", regularized, 120, Refinement::PmfGeometry),
-                learned("regularised + PMF, triangulation", regularized, 120, Refinement::Pmf),
+                learned("regularised + PMF", regularized, 120, Refinement::Pmf),
+                learned(
+                    "regularised + PMF, shared triangulation",
+                    regularized,
+                    120,
+                    Refinement::SharedTriangulation,
+                ),
                 learned("FMNet", plain, 120, Refinement::None),
-                learned("FMNet + PMF", plain, 120, Refinement::PmfGeometry),
+                learned("FMNet + PMF", plain, 120, Refinement::Pmf),
                 learned("Siamese", siamese, 120, Refinement::None),
                 shot(120),
             ],

@@ -18,12 +18,14 @@
 mod bisect;
 mod kernels;
 mod leaves;
+mod mutual;
 mod query;
 
 use crate::Matrix;
 use bisect::Partition;
 use kernels::Kernels;
 use leaves::Leaves;
+pub(crate) use mutual::mutual_nearest;
 use thiserror::Error;
 
 /// For each query, the nearest target.

@@ -91,8 +91,9 @@ fn suffix(refinement: Refinement) -> &'static str {
         Refinement::None => "",
         Refinement::Icp => " + ICP",
         Refinement::Zoomout => " + ZoomOut",
+        Refinement::Wavelet => " + wavelet filter",
         Refinement::Pmf => " + PMF",
-        Refinement::PmfGeometry => " + PMF, geometry alone",
+        Refinement::SharedTriangulation => " + PMF, shared triangulation",
     }
 }
 

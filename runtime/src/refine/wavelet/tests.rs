@@ -1,0 +1,158 @@
+use super::*;
+use crate::fmap::test_basis::{assert_close, flipped, identity, rectangle, reordered, shuffle};
+
+/// The permutation that takes a shape to [`reordered`], and back.
+fn permutation(order: &[u32]) -> [PointMap; 2] {
+    let mut forth = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(y, &x)| forth[x as usize] = y as u32);
+    [PointMap::new(forth, order.len()), PointMap::new(order.to_vec(), order.len())]
+}
+
+/// A map and the one back, each with every fifth match replaced by one far away.
+fn partly_wrong([forth, back]: &[PointMap; 2]) -> [PointMap; 2] {
+    [forth, back].map(|map| {
+        let n = map.len();
+        let mut wrong = map.clone();
+        (0..n).step_by(5).for_each(|x| wrong.targets[x] = map.targets[(x * 7 + n / 3) % n]);
+        wrong
+    })
+}
+
+/// The exact maps as `k` eigenfunctions tell them.
+fn blurred(source: &Eigenbasis, target: &Eigenbasis, exact: &[PointMap; 2], k: usize) -> [PointMap; 2] {
+    let (source, target) = (source.truncated(k), target.truncated(k));
+    let noise = |i: usize, j: usize| 0.1 * ((i * k + j) as f64 * 7.3).sin();
+    let maps = BothMaps::of([&exact[0], &exact[1]], &source, &target).unwrap();
+    let disturbed = |c: &Matrix| Matrix::from_fn(k, k, |i, j| c[(i, j)] + noise(i, j));
+    let maps = BothMaps { forth: disturbed(&maps.forth), back: disturbed(&maps.back) };
+    let embedding = maps.embedding(&source, &target).unwrap();
+    [embedding.forth().unwrap(), embedding.back().unwrap()]
+}
+
+fn share_equal(found: &PointMap, expected: &PointMap) -> f64 {
+    let equal = found.targets.iter().zip(&expected.targets).filter(|(a, b)| a == b).count();
+    equal as f64 / expected.len() as f64
+}
+
+fn options() -> WaveletOptions {
+    let stages = [(12, 4), (30, 3), (60, 3)].map(|(k, rounds)| WaveletStage { k, rounds });
+    WaveletOptions { stages: stages.to_vec(), ..WaveletOptions::default() }
+}
+
+fn refined(
+    maps: &[PointMap; 2],
+    bases: [&Eigenbasis; 2],
+    options: &WaveletOptions,
+) -> RefinedBoth<WaveletInfo> {
+    wavelet([&maps[0], &maps[1]], bases[0], bases[1], options).unwrap()
+}
+
+#[test]
+fn an_exact_map_stays_exact() {
+    let source = rectangle(30, 40, 60);
+    let order = shuffle(1200);
+    let target = reordered(&flipped(&source), &order);
+    let exact = permutation(&order);
+    let found = refined(&exact, [&source, &target], &options());
+    assert_eq!(found.map.targets, exact[0].targets);
+    assert_eq!(found.map_back.targets, exact[1].targets);
+    assert!(found.map.confidence.iter().flatten().all(|&c| c > 1.0 - 1e-6));
+    assert_eq!(found.info.rounds, [12, 12, 12, 12, 30, 30, 30, 60, 60, 60]);
+    let expected = BothMaps::of([&exact[0], &exact[1]], &source, &target).unwrap();
+    assert_close(&found.functional_maps.forth, &expected.forth, 1e-10);
+    assert_close(&found.functional_maps.back, &expected.back, 1e-10);
+}
+
+#[test]
+fn a_rough_map_of_a_permuted_copy_becomes_exact() {
+    let source = rectangle(30, 40, 60);
+    let order = shuffle(1200);
+    let target = reordered(&flipped(&source), &order);
+    let exact = permutation(&order);
+    for start in [partly_wrong(&exact), blurred(&source, &target, &exact, 12)] {
+        assert!(share_equal(&start[0], &exact[0]) < 0.81);
+        let found = refined(&start, [&source, &target], &options());
+        let shares = [share_equal(&found.map, &exact[0]), share_equal(&found.map_back, &exact[1])];
+        assert_eq!(shares, [1.0; 2]);
+        assert!((0..60).all(|i| (found.functional_maps.forth[(i, i)].abs() - 1.0).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn unmatched_vertices_are_filled_in() {
+    let basis = rectangle(30, 40, 60);
+    let mut start = PointMap::new((0..1200).collect(), 1200);
+    start.targets.iter_mut().step_by(3).for_each(|target| *target = PointMap::UNMATCHED);
+    let exact = PointMap::new((0..1200).collect(), 1200);
+    let found = refined(&[start.clone(), start.clone()], [&basis, &basis], &options());
+    assert_eq!(found.map.targets, exact.targets);
+    assert_eq!(found.map_back.targets, exact.targets);
+    let nothing = PointMap::new(vec![PointMap::UNMATCHED; 1200], 1200);
+    for maps in [[&nothing, &start], [&start, &nothing]] {
+        let failed = wavelet(maps, &basis, &basis, &WaveletOptions::default());
+        assert_eq!(failed.unwrap_err(), RefineError::NothingMatched);
+    }
+}
+
+#[test]
+fn exchanging_the_shapes_exchanges_the_maps() {
+    let (source, target) = (rectangle(30, 40, 60), rectangle(33, 37, 60));
+    let k = 12;
+    let maps = BothMaps::with_adjoint(identity(k));
+    let (phi, psi) = (source.truncated(k), target.truncated(k));
+    let embedding = maps.embedding(&phi, &psi).unwrap();
+    let start = [embedding.forth().unwrap(), embedding.back().unwrap()];
+    let found = refined(&start, [&source, &target], &options());
+    let [forth, back] = start;
+    let other = refined(&[back, forth], [&target, &source], &options());
+    // All but ties, of which a regular grid has many.
+    assert!(share_equal(&found.map, &other.map_back) > 0.99);
+    assert!(share_equal(&found.map_back, &other.map) > 0.99);
+}
+
+#[test]
+fn stages_begin_at_the_map_s_k_and_end_where_asked() {
+    let ks = |options: &WaveletOptions| options.stages.iter().map(|stage| stage.k).collect::<Vec<_>>();
+    assert_eq!(WaveletOptions::between(100, 200), WaveletOptions::default());
+    assert_eq!(ks(&WaveletOptions::between(30, 200)), [30, 60, 128, 200]);
+    assert_eq!(ks(&WaveletOptions::between(100, 250)), [60, 128, 200, 250]);
+    assert_eq!(ks(&WaveletOptions::between(100, 100)), [60, 100]);
+    assert_eq!(ks(&WaveletOptions::between(40, 40)), [40]);
+}
+
+#[test]
+fn options_out_of_range_and_parts_are_errors() {
+    let basis = rectangle(9, 8, 10);
+    let map = PointMap::new((0..72).collect(), 72);
+    let default = WaveletOptions::default();
+    let fails = |options: &WaveletOptions| wavelet([&map, &map], &basis, &basis, options).unwrap_err();
+    let stage = |k, rounds| vec![WaveletStage { k, rounds }];
+    for (options, name) in [
+        (WaveletOptions { stages: Vec::new(), ..default.clone() }, "the number of stages"),
+        (WaveletOptions { stages: stage(0, 1), ..default.clone() }, "k of a stage"),
+        (WaveletOptions { stages: stage(1, 0), ..default.clone() }, "rounds of a stage"),
+    ] {
+        assert_eq!(fails(&options).to_string(), format!("{name} is 0, but must be at least 1"));
+    }
+    assert!(fails(&WaveletOptions { part: true, ..default.clone() }).to_string().contains("zoomout"));
+    let short = PointMap::new(vec![0; 3], 72);
+    for maps in [[&short, &map], [&map, &short]] {
+        assert!(matches!(wavelet(maps, &basis, &basis, &default), Err(RefineError::Fmap(_))));
+    }
+    let clamped = refined(&[map.clone(), map.clone()], [&basis, &basis], &default);
+    assert_eq!(clamped.info.rounds, [10; 10]);
+}
+
+#[test]
+fn thread_count_does_not_matter() {
+    let basis = rectangle(70, 75, 40);
+    let exact = PointMap::new((0..5250).collect(), 5250);
+    let start = partly_wrong(&[exact.clone(), exact]);
+    let stages = [(12, 2), (40, 3)].map(|(k, rounds)| WaveletStage { k, rounds }).to_vec();
+    let options = WaveletOptions { stages, ..WaveletOptions::default() };
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| refined(&start, [&basis, &basis], &options))
+    };
+    assert!(run(1) == run(3));
+}
