@@ -32,8 +32,6 @@ pub struct Template {
     normals: Vec<Vec3>,
     pub(super) faces: Vec<[u32; 3]>,
     pub(super) influences: Vec<Influences>,
-    /// Of every vertex the one at its mirror image.
-    pub(super) twins: Vec<u32>,
     reaches: Vec<Vec<(u32, f32)>>,
     proxies: Proxies,
     /// The typical individual at rest.
@@ -48,11 +46,11 @@ impl Template {
         let (recipe, mut surface) = sound_body(species, breed);
         let places = species.family().landmarks().on(&recipe.parts, recipe.scale);
         let landmarks = surface.snap_to(&places);
-        let Surface { points, faces, twins, influences } = surface;
+        let Surface { points, faces, influences } = surface;
         let mut normals = vertex_normals(&points, &faces);
-        for i in 0..points.len() {
+        for (i, &twin) in twins.iter().enumerate() {
             if points[i][0] > 0.0 {
-                normals[twins[i] as usize] = mirrored(normals[i]);
+                normals[twin as usize] = mirrored(normals[i]);
             }
         }
         let typical = BodyShape::typical(&recipe);
