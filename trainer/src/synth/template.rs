@@ -57,7 +57,7 @@ impl Template {
         let rest = scale_bones(&recipe.skeleton, &influences, &points, &typical.scales);
         let reaches = recipe.features.iter().map(|feature| reach_of(feature, &points, &normals)).collect();
         let proxies = Proxies::new(&recipe, &typical);
-        Self { species, recipe, points, normals, faces, influences, twins, reaches, proxies, rest, landmarks }
+        Self { species, recipe, points, normals, faces, influences, reaches, proxies, rest, landmarks }
     }
 
     /// The species it is the template of.
