@@ -46,7 +46,7 @@ impl Template {
         let (recipe, mut surface) = sound_body(species, breed);
         let places = species.family().landmarks().on(&recipe.parts, recipe.scale);
         let landmarks = surface.snap_to(&places);
-        let Surface { points, faces, influences } = surface;
+        let Surface { points, faces, twins, influences } = surface;
         let mut normals = vertex_normals(&points, &faces);
         for (i, &twin) in twins.iter().enumerate() {
             if points[i][0] > 0.0 {

@@ -4,7 +4,6 @@ use super::mirror::{mirrored, pair_up};
 use super::template::Stance;
 use super::*;
 use fmnet::Mesh;
-use fmnet::Mesh;
 use fmnet::mesh::vec3;
 
 fn edge_counts(mesh: &Mesh) -> HashMap<(u32, u32), usize> {
