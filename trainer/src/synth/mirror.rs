@@ -15,9 +15,9 @@ pub(super) fn mirrored([x, y, z]: Vec3) -> Vec3 {
 pub(super) fn pair_up(points: &mut [Vec3]) -> Vec<u32> {
     let images: Vec<Vec3> = points.iter().map(|&p| mirrored(p)).collect();
     let twins = nearest_vertices(points, &images);
-    for i in 0..points.len() {
+    for (i, &twin) in twins.iter().enumerate() {
         if points[i][0] > 0.0 {
-            points[twins[i] as usize] = mirrored(points[i]);
+            points[twin as usize] = mirrored(points[i]);
         }
     }
     twins

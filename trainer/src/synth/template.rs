@@ -32,8 +32,6 @@ pub struct Template {
     normals: Vec<Vec3>,
     pub(super) faces: Vec<[u32; 3]>,
     pub(super) influences: Vec<Influences>,
-    /// Of every vertex the one at its mirror image.
-    pub(super) twins: Vec<u32>,
     reaches: Vec<Vec<(u32, f32)>>,
     proxies: Proxies,
     /// The typical individual at rest.
@@ -50,16 +48,16 @@ impl Template {
         let landmarks = surface.snap_to(&places);
         let Surface { points, faces, twins, influences } = surface;
         let mut normals = vertex_normals(&points, &faces);
-        for i in 0..points.len() {
+        for (i, &twin) in twins.iter().enumerate() {
             if points[i][0] > 0.0 {
-                normals[twins[i] as usize] = mirrored(normals[i]);
+                normals[twin as usize] = mirrored(normals[i]);
             }
         }
         let typical = BodyShape::typical(&recipe);
         let rest = scale_bones(&recipe.skeleton, &influences, &points, &typical.scales);
         let reaches = recipe.features.iter().map(|feature| reach_of(feature, &points, &normals)).collect();
         let proxies = Proxies::new(&recipe, &typical);
-        Self { species, recipe, points, normals, faces, influences, twins, reaches, proxies, rest, landmarks }
+        Self { species, recipe, points, normals, faces, influences, reaches, proxies, rest, landmarks }
     }
 
     /// The species it is the template of.

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use super::mirror::mirrored;
+use super::mirror::{mirrored, pair_up};
 use super::template::Stance;
 use super::*;
 use fmnet::Mesh;
@@ -145,13 +145,13 @@ fn symmetric_individuals_are_their_own_mirror_image() {
         let species = species(name);
         let template = Template::new(species, 1);
         let seed = (0..).find(|&seed| Stance::of(species, seed) == Stance::Symmetric).unwrap();
-        let points = template.unturned(seed);
+        let (points, twins) = (template.unturned(seed), pair_up(&mut template.points.clone()));
         for (i, p) in points.iter().enumerate() {
-            let distance = vec3::distance(mirrored(*p), points[template.twins[i] as usize]);
+            let distance = vec3::distance(mirrored(*p), points[twins[i] as usize]);
             assert!(distance < 1e-12, "{name}: vertex {i} is {distance} from the mirror image of its twin");
         }
         let pairs = template.landmarks.as_chunks::<2>().0.iter();
-        assert!(pairs.filter(|[i, _]| *i != UNMATCHED).all(|&[i, j]| template.twins[i as usize] == j));
+        assert!(pairs.filter(|[i, _]| *i != UNMATCHED).all(|&[i, j]| twins[i as usize] == j));
     }
     let stances: Vec<Stance> = (0..400).map(|seed| Stance::of(species("man"), seed)).collect();
     let count = |stance: Stance| stances.iter().filter(|&&s| s == stance).count();

@@ -127,7 +127,7 @@ impl Sculptor {
             let on = |p: Vec3| mirror(p, side);
             let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
             let (upper, lower) = (sleeve.min(1.0), (sleeve - 1.0).max(0.0));
-            let radius = |t: f64| (0.064 - 0.018 * t) * to.arm_girth + loose;
+            let radius = |t: f64| (0.056 - 0.014 * t) * to.arm_girth + loose;
             let join = |name: usize| [limb(name, side)];
             let (start, end) = (on(lerp(shoulder, elbow, 0.04)), on(lerp(shoulder, elbow, upper)));
             let girth = Girth(radius(0.0), radius(upper), 0.0);
