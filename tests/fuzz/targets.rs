@@ -9,8 +9,8 @@ use fmnet::io::{
     Attributes, Joint, Skin, Texture, decode_mesh, read_matrix, read_point_map, read_surface_points,
     read_vector, write_matrix, write_mesh, write_point_map, write_surface_points,
 };
-use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
+use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet::point_map::PointMap;
 use fmnet::shape::{Shape, ShapeOptions};

@@ -70,7 +70,10 @@ fn point(words: &mut Words<'_>, n_faces: usize) -> Parsed<Option<SurfacePoint>> 
         return Err(wrong(words, format!("{} follows the three weights", quote(word))));
     }
     if let Some(weight) = weights.iter().find(|w| **w < -TOLERANCE) {
-        return Err(wrong(words, format!("the weight {weight} is negative, so the point is off its triangle")));
+        return Err(wrong(
+            words,
+            format!("the weight {weight} is negative, so the point is off its triangle"),
+        ));
     }
     let sum: f64 = weights.iter().sum();
     if (sum - 1.0).abs() > TOLERANCE {
@@ -116,7 +119,8 @@ mod tests {
 
     #[test]
     fn weights_of_few_digits_are_set_right() {
-        let points = decode(b"# by hand\n2.0000e+00 0.333 0.333 0.333\n\n-1\n-1 -1 -1 -1\r\n4 -0.001 0.5 0.501\n", 4);
+        let points =
+            decode(b"# by hand\n2.0000e+00 0.333 0.333 0.333\n\n-1\n-1 -1 -1 -1\r\n4 -0.001 0.5 0.501\n", 4);
         let points = points.unwrap();
         assert_eq!(points.len(), 4);
         let first = points[0].unwrap();

@@ -158,9 +158,8 @@ fn build(boxes: &[[Vec3; 2]], faces: &mut [u32], first: usize, nodes: &mut Vec<N
     let spreads = [spread(0), spread(1), spread(2)];
     let axis = (0..3).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or(0);
     let middle = faces.len() / 2;
-    faces.select_nth_unstable_by(middle, |&a, &b| {
-        center(a, axis).total_cmp(&center(b, axis)).then(a.cmp(&b))
-    });
+    faces
+        .select_nth_unstable_by(middle, |&a, &b| center(a, axis).total_cmp(&center(b, axis)).then(a.cmp(&b)));
     let (left, right) = faces.split_at_mut(middle);
     build(boxes, left, first, nodes);
     nodes[at].next = nodes.len() as u32;

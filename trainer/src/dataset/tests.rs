@@ -187,10 +187,9 @@ fn surface_points_give_positions_and_the_heaviest_vertex() {
     assert!(surface[1].is_none() && surface[2].unwrap().face == 3);
 
     let (_folder, dataset) = with_surface_points("2 0.5 0.25 0.25\n5 1 0 0\n");
-    for error in [
-        points(&dataset.shapes[0]).unwrap_err(),
-        dataset.shapes[0].surface_points(&mesh).unwrap_err(),
-    ] {
+    for error in
+        [points(&dataset.shapes[0]).unwrap_err(), dataset.shapes[0].surface_points(&mesh).unwrap_err()]
+    {
         let error = error.to_string();
         assert!(error.contains("a.CORR, line 2: triangle 5"), "{error}");
     }
@@ -236,7 +235,8 @@ fn every_correspondence_gives_points_on_the_surface() {
     }
     // A vertex of no triangle is on no surface.
     let (_folder, dataset) = with_surface_points("");
-    let lone = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0; 3]], vec![[0, 1, 2]]).unwrap();
+    let lone =
+        Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0; 3]], vec![[0, 1, 2]]).unwrap();
     let identity = ShapeEntry { correspondence: Correspondence::Identity, ..dataset.shapes[0].clone() };
     assert_eq!(identity.surface_points(&lone).unwrap()[3], None);
 }

@@ -3,9 +3,9 @@
 use super::folder::{claim, save};
 use super::{SimulateError, SimulateProgress, TriangulationOptions, triangulated};
 use crate::dataset::{Correspondence, Dataset, ShapeEntry, Split, manifest};
+use fmnet::Mesh;
 use fmnet::io::write_surface_points;
 use fmnet::mesh::{SurfacePoint, farthest_point_sampling_by, vec3};
-use fmnet::Mesh;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -45,7 +45,8 @@ pub fn write_triangulations(
     if entries().next().is_none() {
         return Err(unfit("no shapes in these splits".into()));
     }
-    if let Some((_, shape)) = entries().find(|(_, s)| s.name.contains(['/', '\\']) || s.name.starts_with('.')) {
+    if let Some((_, shape)) = entries().find(|(_, s)| s.name.contains(['/', '\\']) || s.name.starts_with('.'))
+    {
         return Err(unfit(format!("the name {:?} is no name for a file; choose another one", shape.name)));
     }
     claim(out, &[SHAPES], "triangulations", &dataset.folder, options)?;

@@ -65,7 +65,8 @@ impl Manner {
     /// Fewer vertices lose the fingers.
     pub(super) fn least_vertices(self) -> usize {
         match self {
-            Self::Marching | Self::Quads => 4000,
+            Self::Marching => 8000,
+            Self::Quads => 4000,
             _ => 0,
         }
     }
@@ -106,9 +107,10 @@ pub(super) fn triangulate(
             // Decimation keeps vertices, so the dense mesh must not have those of the template.
             let dense = (3 * target).clamp(8000, 30_000);
             let start = start(surface, dense)?;
-            let independent = remesh(surface, &metric::even(surface, dense), &start, 3);
+            let independent = remesh(surface, &metric::even(surface, dense), &start, dense, 3);
             let evenness = 10f64.powf(uniform(rng, -5.0, -2.5));
-            Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?.mesh)
+            Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?
+                .mesh)
         }
         Manner::Marching => marching(surface.mesh, target, rng),
         Manner::Quads => {
@@ -121,7 +123,7 @@ pub(super) fn triangulate(
 }
 
 fn by_metric(surface: &Surface, metrics: &[Metric], target: usize) -> Result<Mesh, SimulateError> {
-    Ok(remesh(surface, metrics, &start(surface, target)?, ROUNDS))
+    Ok(remesh(surface, metrics, &start(surface, target)?, target, ROUNDS))
 }
 
 /// The surface with about as many vertices, or all it has.
@@ -144,7 +146,12 @@ fn marching(mesh: &Mesh, target: usize, rng: &mut ChaCha8Rng) -> Result<Mesh, Si
 
 /// The mesh itself, with some of its edges flipped and its vertices moved along the surface, so that its connectivity gives
 /// nothing away.
-fn shifted(surface: &Surface, mesh: &Mesh, target: usize, rng: &mut ChaCha8Rng) -> Result<Mesh, SimulateError> {
+fn shifted(
+    surface: &Surface,
+    mesh: &Mesh,
+    target: usize,
+    rng: &mut ChaCha8Rng,
+) -> Result<Mesh, SimulateError> {
     let mesh = decimate(mesh, target, &DecimateOptions::default())?.mesh;
     let flips = uniform(rng, 0.1, 0.5);
     let mut places = surface.places(&mesh);

@@ -93,7 +93,8 @@ fn glued(mesh: &Mesh, plan: &Plan, rng: &mut ChaCha8Rng) -> Result<Mesh, Simulat
 
 fn mean_edge(mesh: &Mesh) -> f64 {
     let topology = Topology::new(mesh);
-    let length = |[i, j]: &[u32; 2]| vec3::distance(mesh.vertices()[*i as usize], mesh.vertices()[*j as usize]);
+    let length =
+        |[i, j]: &[u32; 2]| vec3::distance(mesh.vertices()[*i as usize], mesh.vertices()[*j as usize]);
     topology.edges().iter().map(length).sum::<f64>() / topology.edges().len().max(1) as f64
 }
 

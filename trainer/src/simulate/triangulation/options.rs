@@ -132,11 +132,13 @@ impl Plan {
             true => options.manners[weighted(&mut rng, &shares) as usize],
             false => Manner::Isotropic,
         };
-        let [least, typical, most] = [options.min_vertices, options.typical_vertices, options.max_vertices]
-            .map(|n| (n as f64).ln());
+        let [least, typical, most] =
+            [options.min_vertices, options.typical_vertices, options.max_vertices].map(|n| (n as f64).ln());
         let (low, high) = if rng.random() { (least, typical) } else { (typical, most) };
-        let vertices = (uniform(&mut rng, low, high).exp().round() as usize)
-            .clamp(options.min_vertices.max(manner.least_vertices()).min(options.max_vertices), options.max_vertices);
+        let vertices = (uniform(&mut rng, low, high).exp().round() as usize).clamp(
+            options.min_vertices.max(manner.least_vertices()).min(options.max_vertices),
+            options.max_vertices,
+        );
         let vertices = if manner == Manner::Original { options.max_vertices } else { vertices };
         // Every share is drawn whatever came before, so that one option does not shift what the others get.
         let mut chosen = |share: f64| rng.random::<f64>() < share;

@@ -162,9 +162,10 @@ fn split(places: &[Place], quads: &[[u32; 4]], rng: &mut impl Rng) -> Mesh {
             let uprights = halves(first).map(|face| {
                 let [p, q, r] = face.map(position);
                 let normal = unit(vec3::cross(vec3::sub(q, p), vec3::sub(r, p)));
-                vec3::dot(normal, unit(face.iter().fold([0.0; 3], |sum, &i| {
-                    vec3::add(sum, places[i as usize].normal)
-                })))
+                vec3::dot(
+                    normal,
+                    unit(face.iter().fold([0.0; 3], |sum, &i| vec3::add(sum, places[i as usize].normal))),
+                )
             });
             uprights[0].min(uprights[1])
         };

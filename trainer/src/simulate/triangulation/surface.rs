@@ -33,9 +33,8 @@ impl<'a> Surface<'a> {
         let point = self.tree.find_facing(position, normal)?;
         let corners = self.mesh.faces()[point.face as usize];
         let terms = corners.iter().zip(point.weights);
-        let sum = terms.fold([0.0; 3], |sum, (&i, w)| {
-            vec3::add(sum, vec3::scale(self.normals[i as usize], w))
-        });
+        let sum =
+            terms.fold([0.0; 3], |sum, (&i, w)| vec3::add(sum, vec3::scale(self.normals[i as usize], w)));
         let vertex = point.nearest_vertex(self.mesh);
         Some(Place { position: point.position(self.mesh), normal: unit(sum), vertex })
     }

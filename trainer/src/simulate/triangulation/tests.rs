@@ -145,7 +145,8 @@ fn contacts_grow_together_and_lose_their_points() {
 #[test]
 fn open_surfaces_keep_their_boundary() {
     let mesh = open_half_sphere(4);
-    for manner in [Manner::Isotropic, Manner::Anisotropic, Manner::Quads, Manner::Quadrics, Manner::Marching] {
+    for manner in [Manner::Isotropic, Manner::Anisotropic, Manner::Quads, Manner::Quadrics, Manner::Marching]
+    {
         let options = TriangulationOptions { glued: 1.0, ..whole(manner, 600) };
         let made = made(&mesh, &options, 3);
         assert!(!made.plan.glued && made.plan.manner != Manner::Marching);
@@ -168,10 +169,10 @@ fn seed_and_number_decide_not_the_threads() {
             pool.install(|| made(&mesh, &options, 0))
         };
         let first = on(1);
-        assert_eq!(first, on(3), "{manner:?}");
-        assert_ne!(first.mesh, made(&mesh, &options, 1).mesh, "{manner:?}");
+        assert!(first == on(3), "{manner:?}");
+        assert!(first.mesh != made(&mesh, &options, 1).mesh, "{manner:?}");
         let other = TriangulationOptions { seed: 6, ..options.clone() };
-        assert_ne!(first.mesh, made(&mesh, &other, 0).mesh, "{manner:?}");
+        assert!(first.mesh != made(&mesh, &other, 0).mesh, "{manner:?}");
     }
 }
 
@@ -183,7 +184,7 @@ fn size_and_place_do_not_matter() {
     let large = transformed(&mesh, straight, 64.0, [0.0; 3]);
     for manner in [Manner::Isotropic, Manner::Adaptive, Manner::Uneven] {
         let (small, large) = (made(&mesh, &whole(manner, 700), 0), made(&large, &whole(manner, 700), 0));
-        assert_eq!(large.mesh, transformed(&small.mesh, straight, 64.0, [0.0; 3]), "{manner:?}");
+        assert!(large.mesh == transformed(&small.mesh, straight, 64.0, [0.0; 3]), "{manner:?}");
     }
 }
 
