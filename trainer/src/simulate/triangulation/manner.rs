@@ -65,7 +65,8 @@ impl Manner {
     /// Fewer vertices lose the fingers.
     pub(super) fn least_vertices(self) -> usize {
         match self {
-            Self::Marching | Self::Quads => 4000,
+            Self::Marching => 8000,
+            Self::Quads => 4000,
             _ => 0,
         }
     }
@@ -106,7 +107,7 @@ pub(super) fn triangulate(
             // Decimation keeps vertices, so the dense mesh must not have those of the template.
             let dense = (3 * target).clamp(8000, 30_000);
             let start = start(surface, dense)?;
-            let independent = remesh(surface, &metric::even(surface, dense), &start, 3);
+            let independent = remesh(surface, &metric::even(surface, dense), &start, dense, 3);
             let evenness = 10f64.powf(uniform(rng, -5.0, -2.5));
             Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?
                 .mesh)
@@ -122,7 +123,7 @@ pub(super) fn triangulate(
 }
 
 fn by_metric(surface: &Surface, metrics: &[Metric], target: usize) -> Result<Mesh, SimulateError> {
-    Ok(remesh(surface, metrics, &start(surface, target)?, ROUNDS))
+    Ok(remesh(surface, metrics, &start(surface, target)?, target, ROUNDS))
 }
 
 /// The surface with about as many vertices, or all it has.

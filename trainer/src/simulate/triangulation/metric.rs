@@ -47,7 +47,7 @@ pub(super) fn curved(surface: &Surface, target: usize) -> Vec<Metric> {
     let mut sorted = sizes.clone();
     sorted.sort_by(f64::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0);
-    sizes.iter_mut().for_each(|s| *s = s.clamp(0.45 * median, 2.2 * median).ln());
+    sizes.iter_mut().for_each(|s| *s = (*s / median).clamp(0.45, 2.2).ln());
     smooth(&mut sizes, &topology.adjacency(), 6);
     fitted(surface, sizes.into_iter().map(f64::exp).collect(), None, target)
 }

@@ -22,14 +22,25 @@ const FLAT: f64 = 0.866;
 /// Share of the way to the middle of the triangles around it that a vertex goes in each round.
 const STEP: f64 = 0.7;
 
-/// A triangulation of the surface by the wanted edge lengths at its vertices, from another one to begin with.
-pub(super) fn remesh(surface: &Surface, metrics: &[Metric], start: &Mesh, rounds: usize) -> Mesh {
-    let mut work = Work { surface, metrics, sheet: Sheet::new(start), places: surface.places(start) };
-    for _ in 0..rounds {
+/// A triangulation of about `target` vertices by the wanted edge lengths, relative to each other, at the surface's vertices; it
+/// begins with another triangulation.
+pub(super) fn remesh(
+    surface: &Surface,
+    metrics: &[Metric],
+    start: &Mesh,
+    target: usize,
+    rounds: usize,
+) -> Mesh {
+    let (sheet, places) = (Sheet::new(start), surface.places(start));
+    let mut work = Work { surface, metrics, factor: 1.0, sheet, places };
+    for round in 0..rounds {
         work.split_long();
         work.collapse_short();
         work.flip();
         work.relax();
+        if round + 1 < rounds {
+            work.factor *= (work.sheet.n_vertices() as f64 / target as f64).sqrt().clamp(0.8, 1.25);
+        }
     }
     work.flip();
     work.sheet.into_mesh()
@@ -39,6 +50,8 @@ struct Work<'a> {
     surface: &'a Surface<'a>,
     /// Of each vertex of the surface.
     metrics: &'a [Metric],
+    /// What all wanted lengths are multiplied by, for the wanted number of vertices.
+    factor: f64,
     sheet: Sheet,
     /// Where on the surface each vertex is.
     places: Vec<Place>,
@@ -56,7 +69,7 @@ impl Work<'_> {
     /// Length relative to what is wanted, the mean of both ends.
     fn length(&self, a: u32, b: u32) -> f64 {
         let edge = self.vector(a, b);
-        0.5 * (self.metric(a).length(edge) + self.metric(b).length(edge))
+        0.5 * (self.metric(a).length(edge) + self.metric(b).length(edge)) / self.factor
     }
 
     /// The edges whose length is in question, with their lengths.
@@ -115,7 +128,8 @@ impl Work<'_> {
         [(edge.a, edge.b), (edge.b, edge.a)].into_iter().all(|(vertex, other)| {
             self.sheet.ring(vertex).filter(|face| !face.contains(&other)).all(|face| {
                 let [q, r] = [face[1], face[2]].map(|i| self.sheet.points[i as usize]);
-                metric.length(vec3::sub(q, place.position)) < LONG && self.stands(face, place, q, r)
+                metric.length(vec3::sub(q, place.position)) < LONG * self.factor
+                    && self.stands(face, place, q, r)
             })
         })
     }

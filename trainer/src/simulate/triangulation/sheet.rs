@@ -57,6 +57,11 @@ impl Sheet {
         Mesh::new(vertices, faces).expect("points of a valid mesh that moved by finite steps")
     }
 
+    /// Number of vertices that are left.
+    pub(super) fn n_vertices(&self) -> usize {
+        self.rings.iter().filter(|ring| !ring.is_empty()).count()
+    }
+
     pub(super) fn is_fixed(&self, vertex: u32) -> bool {
         self.fixed[vertex as usize]
     }

@@ -169,10 +169,10 @@ fn seed_and_number_decide_not_the_threads() {
             pool.install(|| made(&mesh, &options, 0))
         };
         let first = on(1);
-        assert_eq!(first, on(3), "{manner:?}");
-        assert_ne!(first.mesh, made(&mesh, &options, 1).mesh, "{manner:?}");
+        assert!(first == on(3), "{manner:?}");
+        assert!(first.mesh != made(&mesh, &options, 1).mesh, "{manner:?}");
         let other = TriangulationOptions { seed: 6, ..options.clone() };
-        assert_ne!(first.mesh, made(&mesh, &other, 0).mesh, "{manner:?}");
+        assert!(first.mesh != made(&mesh, &other, 0).mesh, "{manner:?}");
     }
 }
 
@@ -184,7 +184,7 @@ fn size_and_place_do_not_matter() {
     let large = transformed(&mesh, straight, 64.0, [0.0; 3]);
     for manner in [Manner::Isotropic, Manner::Adaptive, Manner::Uneven] {
         let (small, large) = (made(&mesh, &whole(manner, 700), 0), made(&large, &whole(manner, 700), 0));
-        assert_eq!(large.mesh, transformed(&small.mesh, straight, 64.0, [0.0; 3]), "{manner:?}");
+        assert!(large.mesh == transformed(&small.mesh, straight, 64.0, [0.0; 3]), "{manner:?}");
     }
 }
 
