@@ -8,7 +8,7 @@ mod report;
 
 use candle_core::Device;
 use fmnet::Matrix;
-use fmnet_trainer::fm_layer::FmSolver;
+use fmnet::fmap::FmapSolver;
 use fmnet_trainer::network::{Network, NetworkOptions};
 use fmnet_trainer::step::{PairBatch, ShapeBatch, StepOptions, StepRunner};
 use rand::{Rng, SeedableRng};
@@ -35,7 +35,7 @@ fn shape(points: usize, generator: &mut ChaCha8Rng, both_directions: bool) -> Sh
 struct Setting {
     name: &'static str,
     points: usize,
-    solver: FmSolver,
+    solver: FmapSolver,
     both_directions: bool,
 }
 
@@ -77,9 +77,9 @@ fn main() {
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| {
             for (name, points, solver, both_directions) in [
-                ("least squares", 1500, FmSolver::least_squares(), false),
-                ("regularised", 1000, FmSolver::regularized(), false),
-                ("regularised, both directions", 1000, FmSolver::regularized(), true),
+                ("least squares", 1500, FmapSolver::LeastSquares, false),
+                ("regularised", 1000, FmapSolver::default(), false),
+                ("regularised, both directions", 1000, FmapSolver::default(), true),
             ] {
                 run(&report, Setting { name, points, solver, both_directions }, threads);
             }

@@ -1,13 +1,11 @@
 //! The settings of a training run: one type for the configuration file, the command line, the saved copy and the defaults.
 
 use crate::dataset::Split;
-use crate::fm_layer::FmSolver;
 use crate::loss::LossOptions;
 use crate::network::{Activation, NetworkOptions, Normalization};
-use crate::soft_map::ColumnNorm;
 use crate::step::StepOptions;
 use fmnet::descriptor::ShotOptions;
-use fmnet::fmap::FmapSolver;
+use fmnet::fmap::{ColumnNorm, FmapSolver, SolverKind};
 use fmnet::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -33,16 +31,6 @@ pub enum LossKind {
     Soft,
     /// The contrastive loss without the functional map (the paper's equation "siam").
     Siamese,
-}
-
-/// The solver of the functional map inside the training.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum SolverKind {
-    /// The paper's plain least squares.
-    LeastSquares,
-    /// With the resolvent mask of Ren et al. 2019.
-    Regularized,
 }
 
 /// A list of values, separated by commas on the command line.
@@ -126,13 +114,13 @@ train_config! {
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area), between 0 and 1
     shot_radius: f64 = ShotOptions::default().radius,
-    /// Solver of the functional map inside the training
+    /// Solver of the functional map inside the training: least-squares (the paper's) or regularized
     solver: SolverKind = SolverKind::Regularized,
     /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T, 0 or more
     mask_weight: f64 = 0.1,
     /// What is minimised
     loss: LossKind = LossKind::Soft,
-    /// The norm that columns of the soft correspondence are divided by
+    /// The norm that columns of the soft correspondence are divided by: l2 (the authors' code) or l1 (a probability)
     column_norm: ColumnNorm = ColumnNorm::L2,
     /// Siamese loss: margin of dissimilar points, above 0
     margin: f64 = 1.0,
@@ -247,6 +235,9 @@ impl TrainConfig {
             &self.shot_radius,
             "between 0 and 1",
         )?;
+        let trainable = matches!(self.solver, SolverKind::LeastSquares | SolverKind::Regularized);
+        let solver = format!("{:?}", self.solver);
+        range("solver", trainable, &solver, "least-squares or regularized, which solve in one direction")?;
         range("mask-weight", at_least_0(self.mask_weight), &self.mask_weight, "a finite number, 0 or more")?;
         range("gamma", (0.0..=1.0).contains(&self.gamma), &self.gamma, "from 0 to 1")?;
         range("margin", above_0(self.margin), &self.margin, "a finite number above 0")?;
@@ -292,10 +283,7 @@ impl TrainConfig {
 
     /// What a step minimises and how.
     pub fn step_options(&self) -> StepOptions {
-        let functional_map = match self.solver {
-            SolverKind::LeastSquares => FmSolver::least_squares(),
-            SolverKind::Regularized => FmSolver::Regularized { weight: self.mask_weight },
-        };
+        let functional_map = self.fmap_solver();
         let loss = match self.loss {
             LossKind::Soft => LossOptions::SoftError { norm: self.column_norm },
             LossKind::Siamese => LossOptions::Siamese { gamma: self.gamma, margin: self.margin },
@@ -304,12 +292,9 @@ impl TrainConfig {
         StepOptions { functional_map, loss, clip, ..StepOptions::default() }
     }
 
-    /// The solver in the runtime's terms.
-    pub fn runtime_solver(&self) -> FmapSolver {
-        match self.solver {
-            SolverKind::LeastSquares => FmapSolver::LeastSquares,
-            SolverKind::Regularized => FmapSolver::Regularized { weight: self.mask_weight },
-        }
+    /// The solver of the functional map.
+    pub fn fmap_solver(&self) -> FmapSolver {
+        FmapSolver::new(self.solver, Some(self.mask_weight))
     }
 
     /// Folder of preprocessed shapes.
@@ -344,6 +329,16 @@ mod tests {
     }
 
     #[test]
+    fn solver_and_norm_are_named_as_ever() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        std::fs::write(&path, "solver = \"least-squares\"\nmask-weight = 0.1\ncolumn-norm = \"l1\"").unwrap();
+        let config = TrainConfig::read(&path).unwrap();
+        assert_eq!((config.fmap_solver(), config.column_norm), (FmapSolver::LeastSquares, ColumnNorm::L1));
+        assert_eq!(TrainConfig::default().fmap_solver(), FmapSolver::default());
+    }
+
+    #[test]
     fn a_misspelt_setting_and_a_value_out_of_range_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("config.toml");
@@ -375,6 +370,7 @@ mod tests {
         }
         named("validation-pairs", &|c| c.validation_pairs = 0);
         named("decimate", &|c| c.decimate = 499);
+        named("solver", &|c| c.solver = SolverKind::Joint);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which loss is minimised, and the siamese loss of the paper's comparison.
 
-use crate::soft_map::ColumnNorm;
 use candle_core::{Result, Tensor};
+use fmnet::fmap::ColumnNorm;
 use serde::{Deserialize, Serialize};
 
 /// The loss of a training step.

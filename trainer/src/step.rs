@@ -1,14 +1,14 @@
 //! One training step: network, projection, functional map, loss, gradient, Adam.
 
-use crate::fm_layer::{FmSolver, FunctionalMap, functional_map};
+use crate::fm_layer::{FunctionalMap, functional_map};
 use crate::loss::{LossOptions, siamese};
 use crate::network::Network;
 use crate::optimizer::{Adam, AdamOptions};
 use crate::projection::{WeightedBasis, project};
-use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
+use crate::soft_map::{SoftErrorInput, soft_error};
 use candle_core::{DType, Tensor, backprop::GradStore};
 use fmnet::Matrix;
-use fmnet::fmap::resolvent_mask;
+use fmnet::fmap::{ColumnNorm, FmapSolver, resolvent_mask};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -48,7 +48,7 @@ pub struct PairBatch {
 #[serde(default, deny_unknown_fields)]
 pub struct StepOptions {
     /// How the functional map is solved for; default regularised.
-    pub functional_map: FmSolver,
+    pub functional_map: FmapSolver,
     /// What is minimised; default the soft error.
     pub loss: LossOptions,
     /// The optimiser.
@@ -248,7 +248,7 @@ impl StepRunner {
         (to, spectral_to): (&ShapeBatch, &Tensor),
     ) -> Result<FunctionalMap, candle_core::Error> {
         let mask = resolvent_mask(&from.eigenvalues, &to.eigenvalues);
-        functional_map(spectral_from, spectral_to, &self.options.functional_map, &mask)
+        functional_map(spectral_from, spectral_to, self.options.functional_map, &mask)
     }
 }
 

@@ -320,7 +320,7 @@ impl Run<'_> {
 
     fn validate(&mut self, validation: &Validation) -> Result<(), TrainError> {
         let result = validation
-            .run(&self.runner.network, self.config.k, self.config.runtime_solver().for_matching())
+            .run(&self.runner.network, self.config.k, self.config.fmap_solver().for_matching())
             .map_err(TrainError::Validation)?;
         let best = result.mean_error < self.best_error;
         if best {

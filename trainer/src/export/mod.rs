@@ -60,7 +60,7 @@ pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata 
         format_version: FORMAT_VERSION,
         shot: shape.shot,
         k: shape.k,
-        solver: config.runtime_solver(),
+        solver: config.fmap_solver(),
         decimate: shape.decimate,
         per_shape_statistics: config.normalization == Normalization::PerShape,
         training_set: origin.training_set.clone().unwrap_or_else(datasets),

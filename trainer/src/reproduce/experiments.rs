@@ -1,8 +1,9 @@
 //! What each experiment consists of.
 
 use super::{Experiment, Preparation, Settings, Test, TestMethod, Training, training_folder};
-use crate::config::{List, LossKind, Sampling, SolverKind, TrainConfig};
+use crate::config::{List, LossKind, Sampling, TrainConfig};
 use crate::dataset::Split;
+use fmnet::fmap::SolverKind;
 use fmnet::pipeline::Refinement;
 use std::path::Path;
 

@@ -53,12 +53,12 @@ fn runner(options: StepOptions) -> StepRunner {
 fn all_options() -> Vec<StepOptions> {
     let soft = |norm| LossOptions::SoftError { norm };
     let with =
-        |functional_map: FmSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
+        |functional_map: FmapSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
     vec![
-        with(FmSolver::least_squares(), soft(ColumnNorm::L2)),
-        with(FmSolver::regularized(), soft(ColumnNorm::L2)),
-        with(FmSolver::regularized(), soft(ColumnNorm::L1)),
-        with(FmSolver::regularized(), LossOptions::Siamese { gamma: 0.5, margin: 3.0 }),
+        with(FmapSolver::LeastSquares, soft(ColumnNorm::L2)),
+        with(FmapSolver::default(), soft(ColumnNorm::L2)),
+        with(FmapSolver::default(), soft(ColumnNorm::L1)),
+        with(FmapSolver::default(), LossOptions::Siamese { gamma: 0.5, margin: 3.0 }),
     ]
 }
 
