@@ -54,14 +54,44 @@ fn the_number_of_threads_does_not_change_a_byte() {
     let work = Workplace::new();
     work.mesh("a.off", &bumpy_sphere(4, 1));
     work.mesh("b.off", &bumpy_sphere(4, 2));
-    let files = |threads: &str| {
+    let files = |threads: &str, refinement: &[&str]| {
         let (map, c) = (format!("m{threads}.csv"), format!("c{threads}.npy"));
         let arguments =
             ["match", "a.off", "b.off", "--threads", threads, "-o", &map, "--save-functional-map", &c];
-        work.succeed(&[&arguments[..], &SHOT, &["--refine", "zoomout"]].concat());
+        work.succeed(&[&arguments[..], &SHOT, refinement].concat());
         (std::fs::read(work.path(&map)).unwrap(), std::fs::read(work.path(&c)).unwrap())
     };
-    assert_eq!(files("1"), files("2"));
+    for refinement in [&["--refine", "zoomout"][..], &["--refine", "wavelet", "--fm", "joint"]] {
+        assert_eq!(files("1", refinement), files("2", refinement), "{refinement:?}");
+    }
+}
+
+/// Only `shared-triangulation` follows what both meshes share, and says so where they share nothing.
+#[test]
+fn refinements_do_what_their_names_say() {
+    let work = Workplace::new();
+    let mesh = bumpy_sphere(3, 1);
+    let (copy, _) = permuted(&mesh, 5);
+    work.mesh("a.off", &mesh);
+    work.mesh("b.off", &copy);
+    work.mesh("other.off", &bumpy_sphere(4, 1));
+    let refined = |target: &str, refinement: &[&str]| -> serde_json::Value {
+        let arguments = ["match", "a.off", target, "-o", "m.txt", "--json"];
+        serde_json::from_str(&work.succeed(&[&arguments[..], &SHOT, refinement].concat())).unwrap()
+    };
+    for name in ["wavelet", "pmf", "pmf-geometry", "shared-triangulation"] {
+        let summary = refined("b.off", &["--refine", name]);
+        let matches = targets(&work.path("m.txt"));
+        let exact = (mesh.vertices().iter().zip(&matches))
+            .filter(|&(vertex, &target)| *vertex == copy.vertices()[target as usize]);
+        assert_eq!(exact.count(), mesh.n_vertices(), "{name}");
+        assert_eq!(summary["pmf"]["edges_kept"].is_number(), name == "shared-triangulation", "{name}");
+    }
+    refined("b.off", &["--refine", "wavelet", "--fm", "two-way"]);
+    let arguments = ["match", "a.off", "other.off", "-o", "m.txt", "--refine", "shared-triangulation"];
+    let warned = work.run(&[&arguments[..], &SHOT].concat());
+    let message = String::from_utf8_lossy(&warned.stderr).to_string();
+    assert!(warned.status.success() && message.contains("not triangulated alike"), "{message}");
 }
 
 #[test]

@@ -6,9 +6,9 @@ use fmnet::Mesh;
 use fmnet::io::{Attributes, write_mesh};
 use fmnet::mesh::shapes::{bumpy_sphere, permuted, transformed};
 use fmnet_trainer::config::{List, Sampling, TrainConfig};
-use fmnet_trainer::network::{NetworkOptions, ResidualOptions};
 use fmnet_trainer::dataset::{Dataset, Split};
 use fmnet_trainer::events::TrainEvent;
+use fmnet_trainer::network::{NetworkOptions, ResidualOptions};
 use fmnet_trainer::simulate::{
     PartKind, PartOptions, ScanOptions, TriangulationOptions, cut_part, write_parts, write_scans,
     write_triangulations,

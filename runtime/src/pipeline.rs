@@ -334,11 +334,9 @@ impl Matcher {
                 functional_map_info.rank, self.k
             )));
         }
-        let needed = memory::search_bytes(
-            source.shape.n(),
-            target.shape.n(),
-            basis_target.k().max(self.shape_options.k),
-        );
+        let is_joint = matches!(solver, FmapSolver::Joint { .. }) || self.refinement == Refinement::Wavelet;
+        let width = basis_target.k().max(self.shape_options.k) * if is_joint { 2 } else { 1 };
+        let needed = memory::search_bytes(source.shape.n(), target.shape.n(), width);
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
         let raw = timed(observer, pair, "point map", || {
             maps.point_map(solver.comparison(), &basis_source, &basis_target)

@@ -9,7 +9,7 @@ mod report;
 use candle_core::Device;
 use fmnet::Matrix;
 use fmnet::diffusion_net::Operators;
-use fmnet_trainer::fm_layer::FmSolver;
+use fmnet::fmap::FmapSolver;
 use fmnet_trainer::losses::LossOptions;
 use fmnet_trainer::network::{
     DiffusionNetwork, DiffusionOptions, Network, NetworkInput, ResidualNetwork, ResidualOptions,
@@ -70,7 +70,7 @@ struct Setting {
     name: &'static str,
     kind: Kind,
     points: usize,
-    solver: FmSolver,
+    solver: FmapSolver,
     both_directions: bool,
 }
 
@@ -123,10 +123,10 @@ fn main() {
             rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| {
             for (name, kind, points, solver, both_directions) in [
-                ("least squares", Kind::Residual, 1500, FmSolver::least_squares(), false),
-                ("regularised", Kind::Residual, 1000, FmSolver::regularized(), false),
-                ("regularised, both directions", Kind::Residual, 1000, FmSolver::regularized(), true),
-                ("diffusion net", Kind::Diffusion, 5000, FmSolver::regularized(), true),
+                ("least squares", Kind::Residual, 1500, FmapSolver::LeastSquares, false),
+                ("regularised", Kind::Residual, 1000, FmapSolver::default(), false),
+                ("regularised, both directions", Kind::Residual, 1000, FmapSolver::default(), true),
+                ("diffusion net", Kind::Diffusion, 5000, FmapSolver::default(), true),
             ] {
                 run(&report, Setting { name, kind, points, solver, both_directions }, threads);
             }

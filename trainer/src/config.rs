@@ -1,12 +1,11 @@
 //! The settings of a training run: one type for the configuration file, the command line, the saved copy and the defaults.
 
 use crate::dataset::Split;
-use crate::fm_layer::FmSolver;
 use crate::losses::LossOptions;
 use crate::network::{DiffusionOptions, NetworkOptions, ResidualOptions};
 use crate::step::StepOptions;
 use fmnet::descriptor::ShotOptions;
-use fmnet::fmap::FmapSolver;
+use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::shape::ShapeOptions;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -24,16 +23,6 @@ pub enum Sampling {
     Uniform,
     /// With probability proportional to the vertex's area, so that dense regions do not dominate (the paper, for scans).
     Area,
-}
-
-/// The solver of the functional map inside the training.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum SolverKind {
-    /// The paper's plain least squares.
-    LeastSquares,
-    /// With the resolvent mask of Ren et al. 2019.
-    Regularized,
 }
 
 /// A list of values, separated by commas on the command line.
@@ -128,7 +117,7 @@ train_config! {
     decimate: usize = 15_000,
     /// SHOT radius, relative to sqrt(area), between 0 and 1
     shot_radius: f64 = ShotOptions::default().radius,
-    /// Solver of the functional map inside the training
+    /// Solver of the functional map inside the training: least-squares (the paper's) or regularized
     solver: SolverKind = SolverKind::Regularized,
     /// Weight of the resolvent mask in the regularised solver, relative to the mean diagonal of F F^T, 0 or more
     mask_weight: f64 = 0.1,
@@ -307,6 +296,9 @@ impl TrainConfig {
             &self.shot_radius,
             "between 0 and 1",
         )?;
+        let trainable = matches!(self.solver, SolverKind::LeastSquares | SolverKind::Regularized);
+        let solver = format!("{:?}", self.solver);
+        range("solver", trainable, &solver, "least-squares or regularized, which solve in one direction")?;
         range("mask-weight", at_least_0(self.mask_weight), &self.mask_weight, "a finite number, 0 or more")?;
         let loss = &self.loss;
         range("loss.gamma", (0.0..=1.0).contains(&loss.gamma), &loss.gamma, "from 0 to 1")?;
@@ -362,22 +354,19 @@ impl TrainConfig {
 
     /// What a step minimises and how.
     pub fn step_options(&self) -> StepOptions {
-        let functional_map = match self.solver {
-            SolverKind::LeastSquares => FmSolver::least_squares(),
-            SolverKind::Regularized => FmSolver::Regularized { weight: self.mask_weight },
-        };
+        let functional_map = FmapSolver::new(self.solver, Some(self.mask_weight));
         let clip = Some(self.clip).filter(|&clip| clip > 0.0);
         StepOptions { functional_map, loss: self.loss.clone(), clip, ..StepOptions::default() }
     }
 
-    /// The solver in the runtime's terms.
-    pub fn runtime_solver(&self) -> FmapSolver {
+    /// The solver of the functional map that a model of this run is matched with: both directions of a regularised
+    /// DiffusionNet.
+    pub fn fmap_solver(&self) -> FmapSolver {
         match self.solver {
             SolverKind::Regularized if self.diffusion().is_some() => {
                 FmapSolver::Joint { weight: self.mask_weight }
             }
-            SolverKind::LeastSquares => FmapSolver::LeastSquares,
-            SolverKind::Regularized => FmapSolver::Regularized { weight: self.mask_weight },
+            solver => FmapSolver::new(solver, Some(self.mask_weight)),
         }
     }
 
@@ -413,6 +402,20 @@ mod tests {
     }
 
     #[test]
+    fn solver_and_norm_are_named_as_ever() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.toml");
+        std::fs::write(&path, "solver = \"least-squares\"\nmask-weight = 0.1\ncolumn-norm = \"l1\"").unwrap();
+        let config = TrainConfig::read(&path).unwrap();
+        assert_eq!(
+            (config.fmap_solver(), config.loss.column_norm),
+            (FmapSolver::LeastSquares, fmnet::fmap::ColumnNorm::L1)
+        );
+        assert_eq!(TrainConfig::paper().fmap_solver(), FmapSolver::default());
+        assert_eq!(TrainConfig::default().fmap_solver(), FmapSolver::Joint { weight: 0.1 });
+    }
+
+    #[test]
     fn a_misspelt_setting_and_a_value_out_of_range_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("config.toml");
@@ -445,6 +448,7 @@ mod tests {
         }
         named("validation-pairs", &|c| c.validation_pairs = 0);
         named("decimate", &|c| c.decimate = 499);
+        named("solver", &|c| c.solver = SolverKind::Joint);
     }
 
     #[test]

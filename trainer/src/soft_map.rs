@@ -8,8 +8,8 @@
 use crate::device::contiguous;
 use crate::numeric::{MatrixView, Real, matmul, matmul_split, vectorized};
 use candle_core::{CpuStorage, CustomOp1, DType, Layout, Result, Shape, Tensor, bail};
+use fmnet::fmap::ColumnNorm;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Source points of a task; fixed, so that results do not depend on the threads.
@@ -18,17 +18,6 @@ const ROWS_PER_TASK: usize = 128;
 const LANES: usize = 16;
 /// Pieces of the long product of the gradient.
 const PIECES: usize = 4;
-
-/// Norm that each column of the soft map is divided by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum ColumnNorm {
-    /// Euclidean (the authors' code).
-    #[default]
-    L2,
-    /// Sum of the entries, which makes a column a probability (the paper's text).
-    L1,
-}
 
 /// The constants of the soft error for one direction of a pair.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! One training step: network, projection, functional maps, losses, gradient, Adam.
 
-use crate::fm_layer::{FmSolver, functional_map};
+use crate::fm_layer::functional_map;
 use crate::losses::{
     LossOptions, SoftAssignment, bijectivity, contrastive, coupling, orthogonality, siamese, spectral,
 };
@@ -10,7 +10,7 @@ use crate::projection::{WeightedBasis, project};
 use crate::soft_map::{SoftErrorInput, soft_error};
 use candle_core::{DType, Tensor, backprop::GradStore};
 use fmnet::Matrix;
-use fmnet::fmap::resolvent_mask;
+use fmnet::fmap::{FmapSolver, resolvent_mask};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -69,7 +69,7 @@ pub struct AssignmentPoints {
 #[serde(default, deny_unknown_fields)]
 pub struct StepOptions {
     /// How the functional map is solved for; default regularised.
-    pub functional_map: FmSolver,
+    pub functional_map: FmapSolver,
     /// What is minimised.
     pub loss: LossOptions,
     /// The optimiser.
@@ -335,7 +335,7 @@ impl Pass<'_> {
         (to, spectral_to): (&ShapeBatch, &Tensor),
     ) -> Result<Tensor, candle_core::Error> {
         let mask = resolvent_mask(&from.eigenvalues, &to.eigenvalues);
-        let solved = functional_map(spectral_from, spectral_to, &self.options.functional_map, &mask)?;
+        let solved = functional_map(spectral_from, spectral_to, self.options.functional_map, &mask)?;
         sum.condition = sum.condition.max(solved.condition);
         Ok(solved.map)
     }

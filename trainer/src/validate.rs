@@ -115,7 +115,7 @@ impl Validation {
             (s.shape.basis.truncated(config.k), t.shape.basis.truncated(config.k));
         let f = basis_source.project(&descriptors(network, &source.input)?);
         let g = basis_target.project(&descriptors(network, &target.input)?);
-        let solver = config.runtime_solver().for_matching();
+        let solver = config.fmap_solver().for_matching();
         let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
         let (maps, _) = functional_maps(&basis_source, &basis_target, &f, &g, solver)?;
         let map = maps.point_map(solver.comparison(), &basis_source, &basis_target)?;

@@ -5,6 +5,7 @@ use crate::Matrix;
 use faer::diag::Diag;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
+use faer::linalg::evd;
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::{Accum, Mat, MatRef, Par};
 
@@ -16,6 +17,7 @@ pub(crate) fn multiply(left: MatRef<'_, f64>, right: MatRef<'_, f64>) -> Matrix 
 }
 
 /// The thin singular value decomposition `A = U diag(s) V^T` of an `[m, n]` matrix, `r = min(m, n)`.
+#[derive(Clone, Debug)]
 pub(crate) struct ThinSvd {
     /// `[m, r]`.
     pub(crate) u: Mat<f64>,
@@ -45,6 +47,20 @@ pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<ThinSvd, FmapError> {
     .map_err(|_| FmapError::NoConvergence { rows, cols })?;
     let s = s.column_vector().iter().copied().collect();
     Ok(ThinSvd { u, s, v })
+}
+
+/// Largest over smallest eigenvalue of a symmetric positive semi-definite `[k, k]` matrix; infinite where it is singular.
+pub(super) fn condition(gram: &Matrix) -> Result<f64, FmapError> {
+    let k = gram.rows();
+    let mut values = Diag::<f64>::zeros(k);
+    let vectors = evd::ComputeEigenvectors::No;
+    let scratch = evd::self_adjoint_evd_scratch::<f64>(k, vectors, Par::Seq, Default::default());
+    let mut memory = MemBuffer::new(scratch);
+    let stack = MemStack::new(&mut memory);
+    evd::self_adjoint_evd(gram.as_faer(), values.as_mut(), None, Par::Seq, stack, Default::default())
+        .map_err(|_| FmapError::NoConvergence { rows: k, cols: k })?;
+    let values = values.column_vector();
+    Ok(if values[0] > 0.0 { values[k - 1] / values[0] } else { f64::INFINITY })
 }
 
 /// The solution of `gram X = right` for a positive definite `gram`, `[k, k]`; `None` where it is singular to

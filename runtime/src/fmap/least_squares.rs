@@ -1,20 +1,21 @@
 //! The functional map of the paper: plain least squares.
 
 use super::dense::ThinSvd;
+use super::factor::Factor;
 use super::{FmapError, FmapInfo, check_system, dense, relative_residual};
 use crate::Matrix;
 
 /// Options of [`least_squares`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeastSquaresOptions {
-    /// Singular values of `F^` below this share of the largest count as zero. Range 0 to 1, default 1e-8:
-    /// descriptors are single precision, so what lies below their rounding says nothing about the shape.
+    /// Singular values of `F^` below this share of the largest count as zero. Range 0 to 1, default 1e-6:
+    /// descriptors are single precision, so what lies near their rounding says nothing about the shape.
     pub relative_threshold: f64,
 }
 
 impl Default for LeastSquaresOptions {
     fn default() -> Self {
-        Self { relative_threshold: 1e-8 }
+        Self { relative_threshold: 1e-6 }
     }
 }
 
@@ -33,6 +34,16 @@ pub fn least_squares(
     options: &LeastSquaresOptions,
 ) -> Result<(Matrix, FmapInfo), FmapError> {
     check_system(f_hat, g_hat)?;
+    let (c, info, _) = solve_least_squares(f_hat, g_hat, options)?;
+    Ok((c, info))
+}
+
+/// The solve of a system that is checked already, and the factor of `F^ F^T`.
+pub(super) fn solve_least_squares(
+    f_hat: &Matrix,
+    g_hat: &Matrix,
+    options: &LeastSquaresOptions,
+) -> Result<(Matrix, FmapInfo, Factor), FmapError> {
     let ThinSvd { u, s, v } = dense::thin_svd(f_hat.as_faer())?;
     let rank = s.iter().take_while(|&&x| x > 0.0 && x >= options.relative_threshold * s[0]).count();
     // G^ V S^+ U^T
@@ -46,5 +57,7 @@ pub fn least_squares(
     let smallest = if s.len() < f_hat.rows() { 0.0 } else { s[s.len() - 1] };
     let condition = if smallest > 0.0 { s[0] / smallest } else { f64::INFINITY };
     let relative_residual = relative_residual(&c, f_hat, g_hat);
-    Ok((c, FmapInfo { rank, condition, relative_residual }))
+    // F^ F^T = U S^2 U^T
+    let gram = ThinSvd { v: u.clone(), s: s.iter().map(|x| x * x).collect(), u };
+    Ok((c, FmapInfo { rank, condition, relative_residual }, Factor::Truncated(gram, rank)))
 }

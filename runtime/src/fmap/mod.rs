@@ -8,11 +8,13 @@
 mod adjoint;
 mod both;
 mod dense;
+mod factor;
 mod least_squares;
 mod part;
 mod points;
 mod regularized;
 mod soft;
+mod solution;
 
 use crate::Matrix;
 use crate::point_map::Comparison;
@@ -27,6 +29,7 @@ pub use part::part;
 pub use points::{from_points, pseudo_inverse};
 pub use regularized::{regularized, resolvent_mask, scale_free_eigenvalues};
 pub use soft::{ColumnNorm, SoftCorrespondence, SoftPeak};
+pub use solution::FmapSolution;
 
 pub(crate) use both::mean_with_transpose;
 pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
@@ -101,14 +104,23 @@ impl FmapSolver {
     }
 }
 
-/// The kinds of [`FmapSolver`], without their settings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+impl Default for FmapSolver {
+    /// What networks are trained with: the regularised solve.
+    fn default() -> Self {
+        Self::new(SolverKind::Regularized, None)
+    }
+}
+
+/// The kinds of [`FmapSolver`], without their settings, as on command lines and in files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum SolverKind {
     /// The paper's: all coefficients by least squares.
     LeastSquares,
     /// With the resolvent mask, from the source to the target.
     Regularized,
     /// With the resolvent mask, the mean of both directions.
+    #[serde(alias = "two-way")]
     #[value(alias = "two-way")]
     Bidirectional,
     /// With the resolvent mask, both directions beside each other.
@@ -118,18 +130,22 @@ pub enum SolverKind {
 }
 
 impl FmapSolver {
-    /// The solver of a kind with a weight of the mask, by default that of the kind; of a weight alone, both directions; of
-    /// neither, `None`.
-    pub fn chosen(kind: Option<SolverKind>, mask_weight: Option<f64>) -> Option<Self> {
+    /// The solver of a kind with a weight of the mask, by default that of the kind.
+    pub fn new(kind: SolverKind, mask_weight: Option<f64>) -> Self {
         let weight = |default| mask_weight.unwrap_or(default);
-        let kind = kind.or(mask_weight.map(|_| SolverKind::Bidirectional))?;
-        Some(match kind {
+        match kind {
             SolverKind::LeastSquares => Self::LeastSquares,
             SolverKind::Regularized => Self::Regularized { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
             SolverKind::Bidirectional => Self::Bidirectional { weight: weight(Self::BIDIRECTIONAL_WEIGHT) },
             SolverKind::Joint => Self::Joint { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
             SolverKind::Part => Self::Part { weight: weight(Self::DEFAULT_MASK_WEIGHT) },
-        })
+        }
+    }
+
+    /// The solver that was asked for, by kind, weight of the mask or both; a weight alone means the bidirectional one.
+    pub fn chosen(kind: Option<SolverKind>, mask_weight: Option<f64>) -> Option<Self> {
+        let kind = kind.or(mask_weight.map(|_| SolverKind::Bidirectional))?;
+        Some(Self::new(kind, mask_weight))
     }
 }
 

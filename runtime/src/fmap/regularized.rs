@@ -1,19 +1,14 @@
 //! The functional map with the resolvent mask.
 
-use super::dense::ThinSvd;
+use super::factor::Factor;
 use super::{FmapError, FmapInfo, check_length, check_system, dense, relative_residual};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::{factor, solve};
-use faer::{Mat, Par};
+use faer::MatMut;
 use rayon::prelude::*;
 
 /// Exponent of the normalised eigenvalues in the resolvent.
 const RESOLVENT_EXPONENT: f64 = 0.5;
-/// Singular values of a row's system below this share of the largest count as zero where its Cholesky factor
-/// fails.
-const SINGULAR: f64 = 1e-12;
 
 /// Eigenvalues times the area of the shape, `[k]`: pure numbers, the same for a shape at any scale.
 pub fn scale_free_eigenvalues(basis: &Eigenbasis) -> Vec<f64> {
@@ -69,96 +64,50 @@ pub fn regularized(
     check_system(f_hat, g_hat)?;
     check_length("the source's list of eigenvalues", eigenvalues_source.len(), f_hat.rows())?;
     check_length("the target's list of eigenvalues", eigenvalues_target.len(), g_hat.rows())?;
-    if !(weight.is_finite() && weight >= 0.0) {
-        return Err(FmapError::BadWeight { weight });
-    }
+    let mask = resolvent_mask(eigenvalues_source, eigenvalues_target);
+    check_mask(f_hat, g_hat, &mask, weight)?;
+    let (c, info, _) = solve_rows(f_hat, g_hat, &mask, weight, drop)?;
+    Ok((c, info))
+}
+
+/// Checks the mask of a system that is checked already.
+pub(super) fn check_mask(
+    f_hat: &Matrix,
+    g_hat: &Matrix,
+    mask: &Matrix,
+    weight: f64,
+) -> Result<(), FmapError> {
+    check_length("a row of the mask", mask.cols(), f_hat.rows())?;
+    check_length("a column of the mask", mask.rows(), g_hat.rows())?;
+    if weight.is_finite() && weight >= 0.0 { Ok(()) } else { Err(FmapError::BadWeight { weight }) }
+}
+
+/// Solves the system of each row of `C`, and gives what `keep` makes of its factor.
+pub(super) fn solve_rows<T: Send>(
+    f_hat: &Matrix,
+    g_hat: &Matrix,
+    mask: &Matrix,
+    weight: f64,
+    keep: impl Fn(Factor) -> T + Sync,
+) -> Result<(Matrix, FmapInfo, Vec<T>), FmapError> {
     let k_source = f_hat.rows();
     let gram = dense::multiply(f_hat.as_faer(), f_hat.as_faer().transpose()); // [k_source, k_source]
     let mean_diagonal = (0..k_source).map(|i| gram[(i, i)]).sum::<f64>() / k_source as f64;
-    let mask = resolvent_mask(eigenvalues_source, eigenvalues_target);
     let mut c = dense::multiply(g_hat.as_faer(), f_hat.as_faer().transpose()); // right-hand sides, then rows of C
-
-    let rows: Vec<RowInfo> = c
-        .data_mut()
-        .par_chunks_mut(k_source)
-        .enumerate()
-        .map_init(
-            || RowSolver::new(k_source),
-            |solver, (i, row)| solver.solve(&gram, mask.row(i), weight * mean_diagonal, row),
-        )
-        .collect::<Result<_, _>>()?;
-    let rank = rows.iter().map(|row| row.rank).min().unwrap_or(0);
-    let condition = rows.iter().map(|row| row.condition).fold(1.0, f64::max);
-    let relative_residual = relative_residual(&c, f_hat, g_hat);
-    Ok((c, FmapInfo { rank, condition, relative_residual }))
-}
-
-struct RowInfo {
-    rank: usize,
-    condition: f64,
-}
-
-/// The workspace for one row's system.
-struct RowSolver {
-    system: Mat<f64>,
-    buffer: MemBuffer,
-}
-
-impl RowSolver {
-    fn new(k: usize) -> Self {
-        let scratch = factor::cholesky_in_place_scratch::<f64>(k, Par::Seq, Default::default())
-            .or(solve::solve_in_place_scratch::<f64>(k, 1, Par::Seq));
-        Self { system: Mat::zeros(k, k), buffer: MemBuffer::new(scratch) }
-    }
-
-    /// Replaces the right-hand side `row` by the solution of `(gram + weight diag(mask)) x = row`.
-    fn solve(
-        &mut self,
-        gram: &Matrix,
-        mask: &[f64],
-        weight: f64,
-        row: &mut [f64],
-    ) -> Result<RowInfo, FmapError> {
-        self.assemble(gram, mask, weight);
-        let k = row.len();
-        let stack = MemStack::new(&mut self.buffer);
-        let factored = factor::cholesky_in_place(
-            self.system.as_mut(),
-            Default::default(),
-            Par::Seq,
-            stack,
-            Default::default(),
-        );
-        let pivots = || (0..k).map(|i| self.system[(i, i)]);
-        let (largest, smallest) = (pivots().fold(0.0, f64::max), pivots().fold(f64::INFINITY, f64::min));
-        if factored.is_ok() && smallest > SINGULAR.sqrt() * largest {
-            let rhs = faer::MatMut::from_column_major_slice_mut(row, k, 1);
-            solve::solve_in_place(self.system.as_ref(), rhs, Par::Seq, stack);
-            return Ok(RowInfo { rank: k, condition: (largest / smallest).powi(2) });
+    let solve = |(i, row): (usize, &mut [f64])| {
+        let mut system = gram.as_faer().to_owned();
+        for (j, &entry) in mask.row(i).iter().enumerate() {
+            system[(j, j)] += weight * mean_diagonal * entry;
         }
-        self.assemble(gram, mask, weight);
-        self.solve_singular(row)
-    }
-
-    fn assemble(&mut self, gram: &Matrix, mask: &[f64], weight: f64) {
-        self.system.copy_from(gram.as_faer());
-        for (i, &entry) in mask.iter().enumerate() {
-            self.system[(i, i)] += weight * entry;
-        }
-    }
-
-    /// The solution of least norm, by the singular value decomposition.
-    fn solve_singular(&self, row: &mut [f64]) -> Result<RowInfo, FmapError> {
-        let k = row.len();
-        let ThinSvd { u, s, v } = dense::thin_svd(self.system.as_ref())?;
-        let rank = s.iter().take_while(|&&x| x > SINGULAR * s[0]).count();
-        let right = Matrix::from_vec(k, 1, row.to_vec());
-        let mut coefficients = dense::multiply(u.transpose(), right.as_faer());
-        for (j, x) in coefficients.data_mut().iter_mut().enumerate() {
-            *x = if j < rank { *x / s[j] } else { 0.0 };
-        }
-        row.copy_from_slice(dense::multiply(v.as_ref(), coefficients.as_faer()).data());
-        let condition = if s[k - 1] > 0.0 { s[0] / s[k - 1] } else { f64::INFINITY };
-        Ok(RowInfo { rank, condition })
-    }
+        let factor = Factor::new(system)?;
+        factor.solve(MatMut::from_column_major_slice_mut(row, k_source, 1));
+        let (rank, condition) = (factor.rank(), factor.condition());
+        Ok((rank, condition, keep(factor)))
+    };
+    let rows: Vec<(usize, f64, T)> =
+        c.data_mut().par_chunks_mut(k_source).enumerate().map(solve).collect::<Result<_, FmapError>>()?;
+    let rank = rows.iter().map(|row| row.0).min().unwrap_or(0);
+    let condition = rows.iter().map(|row| row.1).fold(1.0, f64::max);
+    let info = FmapInfo { rank, condition, relative_residual: relative_residual(&c, f_hat, g_hat) };
+    Ok((c, info, rows.into_iter().map(|row| row.2).collect()))
 }

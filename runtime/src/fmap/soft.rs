@@ -5,18 +5,33 @@ use crate::Matrix;
 use crate::spectral::Eigenbasis;
 use faer::{Accum, Par};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Source vertices handled together.
 const BLOCK: usize = 32;
 
 /// How the columns of the soft correspondence are normalised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ColumnNorm {
     /// Squares sum to one, as in the authors' code.
     #[default]
     L2,
     /// Entries sum to one: the column is a probability distribution over the target.
     L1,
+}
+
+impl FromStr for ColumnNorm {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "l2" => Ok(Self::L2),
+            "l1" => Ok(Self::L1),
+            other => Err(format!("{other:?} is no norm of columns; take l2 or l1")),
+        }
+    }
 }
 
 /// The soft correspondence `P = |Psi C Phi^T A|^`, `[n_target, n_source]` (Litany et al. 2017, eq. 6), of a

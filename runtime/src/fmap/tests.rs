@@ -170,6 +170,60 @@ fn regularized_singular_system_is_reported() {
 }
 
 #[test]
+fn gradients_equal_central_differences() {
+    let (f, g, weights) = (random(5, 9, 41), random(4, 9, 42), random(4, 5, 43));
+    let spectrum = |scale: f64, k: usize| (0..k).map(|i| scale * i as f64).collect::<Vec<_>>();
+    let mask = resolvent_mask(&spectrum(12.0, 5), &spectrum(13.5, 4));
+    let by: [(&str, &dyn Fn(&Matrix, &Matrix) -> FmapSolution); 2] = [
+        ("least squares", &|f, g| {
+            FmapSolution::least_squares(f.clone(), g.clone(), &LeastSquaresOptions::default()).unwrap()
+        }),
+        ("regularised", &|f, g| FmapSolution::regularized(f.clone(), g.clone(), &mask, 3.0).unwrap()),
+    ];
+    for (name, solve) in by {
+        let loss = |f: &Matrix, g: &Matrix| -> f64 {
+            solve(f, g).map().data().iter().zip(weights.data()).map(|(c, w)| w * c * c).sum()
+        };
+        let solution = solve(&f, &g);
+        let upstream = Matrix::from_fn(4, 5, |i, j| 2.0 * weights[(i, j)] * solution.map()[(i, j)]);
+        let (grad_f, grad_g) = solution.backward(&upstream);
+        let step = 1e-5;
+        let moved = |m: &Matrix, entry: usize, by: f64| {
+            let mut moved = m.clone();
+            moved.data_mut()[entry] += by;
+            moved
+        };
+        for (entry, found) in grad_f.data().iter().enumerate() {
+            let difference = loss(&moved(&f, entry, step), &g) - loss(&moved(&f, entry, -step), &g);
+            assert!((found - difference / (2.0 * step)).abs() < 1e-7, "{name}, F entry {entry}");
+        }
+        for (entry, found) in grad_g.data().iter().enumerate() {
+            let difference = loss(&f, &moved(&g, entry, step)) - loss(&f, &moved(&g, entry, -step));
+            assert!((found - difference / (2.0 * step)).abs() < 1e-7, "{name}, G entry {entry}");
+        }
+    }
+}
+
+#[test]
+fn a_solution_s_map_is_that_of_the_plain_solve() {
+    let (f, g) = (random(10, 30, 44), random(9, 30, 45));
+    let spectrum = |k: i32| (0..k).map(f64::from).collect::<Vec<_>>();
+    let (source, target) = (spectrum(10), spectrum(9));
+    let mask = resolvent_mask(&source, &target);
+    let kept = FmapSolution::regularized(f.clone(), g.clone(), &mask, 0.1).unwrap();
+    let (c, info) = regularized(&f, &g, &source, &target, 0.1).unwrap();
+    assert_eq!((kept.map(), kept.info()), (&c, &info));
+    let plain = LeastSquaresOptions::default();
+    let kept_plain = FmapSolution::least_squares(f.clone(), g.clone(), &plain).unwrap();
+    let (c, info) = least_squares(&f, &g, &plain).unwrap();
+    assert_eq!((kept_plain.map(), kept_plain.info()), (&c, &info));
+    let conditions = [kept.gram_condition().unwrap(), kept_plain.gram_condition().unwrap()];
+    assert!((conditions[0] / conditions[1] - 1.0).abs() < 1e-9, "{conditions:?}");
+    let wrong = FmapSolution::regularized(f, g, &mask.transposed(), 0.1).unwrap_err();
+    assert!(matches!(wrong, FmapError::SizeMismatch { .. }));
+}
+
+#[test]
 fn resolvent_mask_vanishes_where_spectra_agree_and_ignores_scale() {
     let eigenvalues = [-1e-15, 1.0, 4.0, 9.0];
     let mask = resolvent_mask(&eigenvalues, &eigenvalues[..3]);
@@ -261,6 +315,13 @@ fn soft_columns_are_normalised() {
             assert!((peaks[x].spread - sum * sum / squares).abs() < 1e-3);
         }
     }
+}
+
+#[test]
+fn column_norms_are_read_by_name() {
+    assert_eq!("l2".parse(), Ok(ColumnNorm::L2));
+    assert_eq!("l1".parse(), Ok(ColumnNorm::L1));
+    assert!("l3".parse::<ColumnNorm>().unwrap_err().contains("l2 or l1"));
 }
 
 #[test]

@@ -1,10 +1,13 @@
 //! Point maps of both directions from one embedding of both shapes.
 
 use super::recover::{check_shape, cosines, transport};
-use super::search::NearestRows;
+use super::search::{NearestRows, SearchError, mutual_nearest, nearest_rows};
 use super::{PointMap, RecoverError};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
+
+/// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
+const MOST_PRODUCTS: usize = 1 << 28;
 
 /// Both shapes in the space of the coefficients of both, `[k_target, k_source]` wide: the row of a source vertex `x` is
 /// `[C12 phi(x), phi(x)]`, that of a target vertex `y` is `[psi(y), C21 psi(y)]`.
@@ -52,6 +55,19 @@ impl JointEmbedding {
     pub fn back(&self) -> Result<PointMap, RecoverError> {
         nearest(&self.target, &self.source)
     }
+
+    /// The matches of both directions, source to target first, for maps that are not final: between small shapes in single
+    /// precision.
+    pub(crate) fn both(&self) -> Result<[Vec<u32>; 2], SearchError> {
+        if self.source.rows().saturating_mul(self.target.rows()) <= MOST_PRODUCTS {
+            return mutual_nearest(&self.source, &self.target);
+        }
+        let (forth, back) = rayon::join(
+            || nearest_rows(&self.source, &self.target),
+            || nearest_rows(&self.target, &self.source),
+        );
+        Ok([forth?.index, back?.index])
+    }
 }
 
 fn nearest(queries: &Matrix, rows: &Matrix) -> Result<PointMap, RecoverError> {
@@ -80,6 +96,7 @@ mod tests {
         let embedding = BothMaps::with_adjoint(identity(25)).embedding(&source, &target).unwrap();
         let (forth, back) = (embedding.forth().unwrap(), embedding.back().unwrap());
         assert_eq!(back.targets, order);
+        assert_eq!(embedding.both().unwrap(), [forth.targets.clone(), order.clone()]);
         assert!(order.iter().enumerate().all(|(y, &x)| forth.targets[x as usize] == y as u32));
         assert!(forth.confidence.iter().chain(&back.confidence).flatten().all(|&c| c > 1.0 - 1e-6));
     }

@@ -12,7 +12,6 @@ use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
 use crate::point_map::PointMap;
-use crate::point_map::search::mutual_nearest;
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
 
@@ -89,7 +88,7 @@ pub struct RefinedBoth<Info> {
 /// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
 /// cosine of the angle between the two rows of the embedding.
 ///
-/// Rounds before the last compare distances in single precision.
+/// Rounds before the last compare distances in single precision where the shapes are small.
 ///
 /// # Errors
 /// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map does not fit the bases or matches
@@ -116,8 +115,7 @@ pub fn wavelet(
     let mut truncated = bases.map(|basis| basis.truncated(rounds[0]));
     for &k in &rounds[..last] {
         let maps = filtered_maps(&images, &mut truncated, bases, k)?;
-        let embedding = maps.embedding(&truncated[0], &truncated[1])?;
-        images = mutual_nearest(&embedding.source, &embedding.target)?;
+        images = maps.embedding(&truncated[0], &truncated[1])?.both()?;
     }
     let functional_maps = filtered_maps(&images, &mut truncated, bases, rounds[last])?;
     let embedding = functional_maps.embedding(&truncated[0], &truncated[1])?;

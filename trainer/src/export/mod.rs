@@ -56,7 +56,7 @@ pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata 
         format_version: FORMAT_VERSION,
         shot: shape.shot,
         k: config.k,
-        solver: config.runtime_solver(),
+        solver: config.fmap_solver(),
         decimate: shape.decimate,
         per_shape_statistics: match &config.network {
             NetworkOptions::Residual(options) => options.normalization == Normalization::PerShape,

@@ -4,7 +4,7 @@ use super::*;
 use crate::testing::{check_gradient, random};
 use candle_core::{DType, Device, Tensor};
 use fmnet::Matrix;
-use fmnet::fmap::{LeastSquaresOptions, least_squares, regularized, resolvent_mask};
+use fmnet::fmap::{FmapSolver, LeastSquaresOptions, least_squares, regularized, resolvent_mask};
 
 const K_SOURCE: usize = 5;
 const K_TARGET: usize = 4;
@@ -25,14 +25,9 @@ fn mask() -> Matrix {
     resolvent_mask(&source, &target)
 }
 
-fn solvers() -> [FmSolver; 4] {
-    [
-        FmSolver::least_squares(),
-        FmSolver::LeastSquares { ridge: 0.05, max_condition: 1e12 },
-        FmSolver::regularized(),
-        FmSolver::Regularized { weight: 3.0 },
-    ]
-}
+const REGULARIZED: FmapSolver = FmapSolver::Regularized { weight: FmapSolver::DEFAULT_MASK_WEIGHT };
+const SOLVERS: [FmapSolver; 3] =
+    [FmapSolver::LeastSquares, REGULARIZED, FmapSolver::Regularized { weight: 3.0 }];
 
 fn rows(tensor: &Tensor) -> Vec<Vec<f64>> {
     tensor.to_dtype(DType::F64).unwrap().to_vec2().unwrap()
@@ -44,13 +39,13 @@ fn every_row_satisfies_its_normal_equations() {
     let (rows_f, rows_g) = (rows(&f), rows(&g));
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     let mean = (0..K_SOURCE).map(|i| dot(&rows_f[i], &rows_f[i])).sum::<f64>() / K_SOURCE as f64;
-    for solver in solvers() {
-        let map = rows(&functional_map(&f, &g, &solver, &mask()).unwrap().map);
+    for solver in SOLVERS {
+        let map = rows(&functional_map(&f, &g, solver, &mask()).unwrap().map);
         for i in 0..K_TARGET {
             for j in 0..K_SOURCE {
                 let diagonal = match solver {
-                    FmSolver::LeastSquares { ridge, .. } => ridge * mean,
-                    FmSolver::Regularized { weight } => weight * mean * mask()[(i, j)],
+                    FmapSolver::Regularized { weight } => weight * mean * mask()[(i, j)],
+                    _ => 0.0,
                 };
                 let system = |l: usize| dot(&rows_f[j], &rows_f[l]);
                 let left = (0..K_SOURCE).map(|l| system(l) * map[i][l]).sum::<f64>() + diagonal * map[i][j];
@@ -69,8 +64,8 @@ fn maps_equal_those_of_the_runtime() {
     let (source, target) = eigenvalues();
     let plain = least_squares(&f_hat, &g_hat, &LeastSquaresOptions::default()).unwrap().0;
     let masked = regularized(&f_hat, &g_hat, &source, &target, 0.1).unwrap().0;
-    for (solver, expected) in [(FmSolver::least_squares(), plain), (FmSolver::regularized(), masked)] {
-        let map = rows(&functional_map(&f, &g, &solver, &mask()).unwrap().map);
+    for (solver, expected) in [(FmapSolver::LeastSquares, plain), (REGULARIZED, masked)] {
+        let map = rows(&functional_map(&f, &g, solver, &mask()).unwrap().map);
         let close = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-11;
         assert!(map.iter().flatten().zip(expected.data()).all(close), "{solver:?}");
     }
@@ -81,9 +76,9 @@ fn gradients_of_both_solvers_equal_central_differences() {
     let weights =
         Tensor::from_vec(random(6, K_TARGET * K_SOURCE), (K_TARGET, K_SOURCE), &Device::Cpu).unwrap();
     let (f, g) = (descriptors(1, K_SOURCE), descriptors(2, K_TARGET));
-    for solver in solvers() {
+    for solver in SOLVERS {
         let loss = |f: &Tensor, g: &Tensor| {
-            let map = functional_map(f, g, &solver, &mask())?.map;
+            let map = functional_map(f, g, solver, &mask())?.map;
             (map.sqr()? * &weights)?.sum_all()
         };
         check_gradient(&f, |x| loss(x, &g), 1e-7);
@@ -94,9 +89,9 @@ fn gradients_of_both_solvers_equal_central_differences() {
 #[test]
 fn single_precision_descriptors_are_solved_in_double_precision() {
     let (f, g) = (descriptors(1, K_SOURCE), descriptors(2, K_TARGET));
-    let exact = rows(&functional_map(&f, &g, &FmSolver::regularized(), &mask()).unwrap().map);
+    let exact = rows(&functional_map(&f, &g, REGULARIZED, &mask()).unwrap().map);
     let (f, g) = (f.to_dtype(DType::F32).unwrap(), g.to_dtype(DType::F32).unwrap());
-    let single = functional_map(&f, &g, &FmSolver::regularized(), &mask()).unwrap();
+    let single = functional_map(&f, &g, REGULARIZED, &mask()).unwrap();
     assert_eq!(single.map.dtype(), DType::F32);
     assert!(single.condition > 1.0 && single.condition < 1e4);
     for (a, b) in exact.iter().flatten().zip(rows(&single.map).iter().flatten()) {
@@ -113,21 +108,20 @@ fn deficient() -> Tensor {
 #[test]
 fn singular_systems_give_the_shortest_solution() {
     let (f, g) = (deficient(), descriptors(2, K_TARGET));
-    let solved = functional_map(&f, &g, &FmSolver::least_squares(), &Matrix::default()).unwrap();
+    let solved = functional_map(&f, &g, FmapSolver::LeastSquares, &Matrix::default()).unwrap();
     assert!(solved.condition > 1e12);
     let map = solved.map;
     // C = G F^+ has its rows in the range of F, and C F is the projection of G: (C F - G) F^T = 0.
     let residual = (map.matmul(&f).unwrap() - g).unwrap().matmul(&f.t().unwrap()).unwrap();
     assert!(rows(&residual).iter().flatten().all(|value| value.abs() < 1e-9));
-    let range = functional_map(&f, &f, &FmSolver::least_squares(), &Matrix::default()).unwrap().map;
+    let range = functional_map(&f, &f, FmapSolver::LeastSquares, &Matrix::default()).unwrap().map;
     let projected = (map.matmul(&range).unwrap() - map).unwrap();
     assert!(rows(&projected).iter().flatten().all(|value| value.abs() < 1e-9));
 }
 
 #[test]
 fn regularised_solve_copes_with_singular_descriptors() {
-    let solved =
-        functional_map(&deficient(), &descriptors(2, K_TARGET), &FmSolver::regularized(), &mask()).unwrap();
+    let solved = functional_map(&deficient(), &descriptors(2, K_TARGET), REGULARIZED, &mask()).unwrap();
     assert!(rows(&solved.map).iter().flatten().all(|value| value.is_finite()));
 }
 
@@ -138,9 +132,9 @@ fn regularised_solve_and_gradient_cope_with_functions_that_no_point_sees() {
     let f: Vec<f64> = unseen.flat_map(|(i, row)| if i == 1 { vec![0.0; Q] } else { row }).collect();
     let f = Tensor::from_vec(f, (K_SOURCE, Q), &Device::Cpu).unwrap();
     let mask = resolvent_mask(&[0.0, 0.0, 12.0, 24.0, 36.0], &[0.0, 13.0, 27.0, 40.0]);
-    let (solver, g) = (FmSolver::regularized(), descriptors(2, K_TARGET));
+    let (solver, g) = (REGULARIZED, descriptors(2, K_TARGET));
     let f = candle_core::Var::from_tensor(&f).unwrap();
-    let map = functional_map(f.as_tensor(), &g, &solver, &mask).unwrap().map;
+    let map = functional_map(f.as_tensor(), &g, solver, &mask).unwrap().map;
     assert!(rows(&map).iter().all(|row| row[1].abs() < 1e-12 && row[0].abs() < 10.0));
     // The loss sees the map through the drawn points only, as the soft correspondence does.
     let seen = map.index_select(&Tensor::new(&[0u32, 2, 3, 4], &Device::Cpu).unwrap(), 1).unwrap();
@@ -155,9 +149,11 @@ fn useless_descriptors_are_an_error_that_says_so() {
     let nan = (descriptors(1, K_SOURCE) * f64::NAN).unwrap();
     let g = descriptors(2, K_TARGET);
     let message = |f: &Tensor| {
-        functional_map(f, &g, &FmSolver::least_squares(), &Matrix::default()).err().unwrap().to_string()
+        functional_map(f, &g, FmapSolver::LeastSquares, &Matrix::default()).err().unwrap().to_string()
     };
     assert!(message(&zeros).contains("all zero"), "{}", message(&zeros));
     assert!(message(&nan).contains("NaN"), "{}", message(&nan));
-    assert!(functional_map(&g, &g, &FmSolver::regularized(), &Matrix::default()).is_err());
+    assert!(functional_map(&g, &g, REGULARIZED, &Matrix::default()).is_err());
+    let untrainable = functional_map(&g, &g, FmapSolver::Bidirectional { weight: 0.1 }, &Matrix::default());
+    assert!(untrainable.err().unwrap().to_string().contains("cannot be trained with"));
 }

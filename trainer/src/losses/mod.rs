@@ -10,7 +10,7 @@ pub(crate) use siamese::siamese;
 pub(crate) use spectral::spectral;
 pub(crate) use unsupervised::{SoftAssignment, bijectivity, coupling, orthogonality};
 
-use crate::soft_map::ColumnNorm;
+use fmnet::fmap::ColumnNorm;
 use serde::{Deserialize, Serialize};
 
 /// The table `[loss]`: the weight of each loss, 0 to leave it out, and their settings.

@@ -1,9 +1,10 @@
 //! What each experiment consists of.
 
 use super::{Experiment, Preparation, Settings, Test, TestMethod, Training, training_folder};
-use crate::config::{List, Sampling, SolverKind, TrainConfig};
+use crate::config::{List, Sampling, TrainConfig};
 use crate::dataset::Split;
 use crate::losses::LossOptions;
+use fmnet::fmap::SolverKind;
 use fmnet::pipeline::Refinement;
 use std::path::Path;
 

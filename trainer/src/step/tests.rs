@@ -4,9 +4,9 @@ use super::*;
 use crate::network::{
     Normalization, ResidualNetwork, ResidualOptions, parameter_values, set_parameter_values,
 };
-use crate::soft_map::ColumnNorm;
 use crate::testing::random;
 use candle_core::Device;
+use fmnet::fmap::ColumnNorm;
 
 const POINTS: usize = 60;
 const K: usize = 8;
@@ -75,14 +75,14 @@ fn all_options() -> Vec<StepOptions> {
     };
     let supervised = LossOptions { temperature: 0.5, ..LossOptions::default() };
     let with =
-        |functional_map: FmSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
+        |functional_map: FmapSolver, loss| StepOptions { functional_map, loss, ..StepOptions::default() };
     vec![
-        with(FmSolver::least_squares(), soft(ColumnNorm::L2)),
-        with(FmSolver::regularized(), soft(ColumnNorm::L2)),
-        with(FmSolver::regularized(), soft(ColumnNorm::L1)),
-        with(FmSolver::regularized(), LossOptions { margin: 3.0, ..LossOptions::siamese() }),
-        with(FmSolver::regularized(), supervised),
-        with(FmSolver::regularized(), unsupervised),
+        with(FmapSolver::LeastSquares, soft(ColumnNorm::L2)),
+        with(FmapSolver::default(), soft(ColumnNorm::L2)),
+        with(FmapSolver::default(), soft(ColumnNorm::L1)),
+        with(FmapSolver::default(), LossOptions { margin: 3.0, ..LossOptions::siamese() }),
+        with(FmapSolver::default(), supervised),
+        with(FmapSolver::default(), unsupervised),
     ]
 }
 

@@ -1,12 +1,12 @@
 //! The fused network against a plain implementation, its gradient against central differences.
 
 use super::*;
-use crate::fm_layer::{FmSolver, functional_map};
+use crate::fm_layer::functional_map;
 use crate::network::parameter_values;
 use crate::projection::{WeightedBasis, project};
-use crate::soft_map::{ColumnNorm, SoftErrorInput, soft_error};
+use crate::soft_map::{SoftErrorInput, soft_error};
 use crate::testing::{check_gradient, random};
-use fmnet::fmap::resolvent_mask;
+use fmnet::fmap::{ColumnNorm, FmapSolver, resolvent_mask};
 
 fn options(normalization: Normalization, activation: Activation) -> ResidualOptions {
     ResidualOptions { blocks: 2, width: 5, normalization, activation, ..ResidualOptions::default() }
@@ -151,16 +151,16 @@ fn gradient_of_the_whole_loss_equals_central_differences() {
         let groups =
             if normalization == Normalization::PerShape { vec![points; 2] } else { vec![2 * points] };
         for (solver, norm) in [
-            (FmSolver::least_squares(), ColumnNorm::L2),
-            (FmSolver::regularized(), ColumnNorm::L2),
-            (FmSolver::regularized(), ColumnNorm::L1),
+            (FmapSolver::LeastSquares, ColumnNorm::L2),
+            (FmapSolver::default(), ColumnNorm::L2),
+            (FmapSolver::default(), ColumnNorm::L1),
         ] {
             let loss = |x: &Tensor| {
                 let out = x.apply_op1(fused(&options, &input, StatisticsOf::Groups(groups.clone())))?;
                 let [of_source, of_target] = bases();
                 let source = project(&out.narrow(0, 0, points)?, of_source)?;
                 let target = project(&out.narrow(0, points, points)?, of_target)?;
-                let solved = functional_map(&source, &target, &solver, &mask)?;
+                let solved = functional_map(&source, &target, solver, &mask)?;
                 let error = SoftErrorInput {
                     basis_source: wide(21),
                     basis_target: wide(22),
