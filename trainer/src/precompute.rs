@@ -8,11 +8,11 @@
 //! shapes gets a random pool of points, from which its minibatches are drawn. Distances are kept as 16-bit numbers, in steps
 //! of 1/16384 of sqrt(area): 12 MB a shape for a pool of 2500.
 
-use crate::dataset::{DatasetError, MISSING, ShapeEntry};
+use crate::dataset::{Correspondence, DatasetError, MISSING, ShapeEntry};
 use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
 use fmnet::events::{Observer, timed};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::mesh::{Topology, nearest_k_vertices, nearest_vertices};
+use fmnet::mesh::{SurfacePoint, Topology, carried_points, nearest_k_vertices, nearest_vertices};
 use fmnet::shape::{Shape, ShapeOptions};
 use fmnet::spectral::eigen_gradients;
 use fmnet::{Error, Matrix, Mesh};
@@ -48,6 +48,44 @@ pub struct ProcessedShape {
     pub shape: Shape,
     /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
+    /// Where the points lie on the triangles of the working mesh; `None` where they are vertices.
+    pub places: Option<Places>,
+}
+
+/// Points on triangles: the three corners of each and their weights. Of a point that the shape lacks both are 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Places {
+    /// Vertices, `[points]`, three times.
+    pub corners: [Vec<u32>; 3],
+    /// Barycentric weights, `[points]`, three times.
+    pub weights: [Vec<f32>; 3],
+}
+
+impl Places {
+    fn new(points: &[Option<SurfacePoint>], mesh: &Mesh) -> Self {
+        let corner = |at: usize| {
+            let vertex = |p: &Option<SurfacePoint>| p.map_or(0, |p| mesh.faces()[p.face as usize][at]);
+            points.iter().map(vertex).collect()
+        };
+        let weight = |at: usize| points.iter().map(|p| p.map_or(0.0, |p| p.weights[at] as f32)).collect();
+        Self { corners: [0, 1, 2].map(corner), weights: [0, 1, 2].map(weight) }
+    }
+
+    /// Those of some points, 0-based, in that order.
+    ///
+    /// # Panics
+    /// If there is no such point.
+    pub fn select(&self, points: &[u32]) -> Self {
+        fn pick<T: Copy>(all: &[T], points: &[u32]) -> Vec<T> {
+            points.iter().map(|&p| all[p as usize]).collect()
+        }
+        let [a, b, c] = &self.corners;
+        let [u, v, w] = &self.weights;
+        Self {
+            corners: [a, b, c].map(|all| pick(all, points)),
+            weights: [u, v, w].map(|all| pick(all, points)),
+        }
+    }
 }
 
 /// A shape ready for training.
@@ -57,6 +95,8 @@ pub struct PreparedShape {
     pub entry: ShapeEntry,
     /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
+    /// Where the points lie on the triangles of the working mesh; `None` where they are vertices.
+    pub places: Option<Places>,
     /// Distances between the points of its pool.
     pub pool: Pool,
     /// For each point the working vertices nearest to its own, `[points, jitter]`; empty where there is no jitter.
@@ -126,9 +166,17 @@ fn process_with_key(
     let options = ShapeOptions { whole_area: entry.whole_area()?, ..options.clone() };
     let mut shape = Shape::process_cached(&entry.name, &mesh, &options, cache, observer)?;
     shape.basis = shape.unit_basis(shape.basis.k());
-    let points = work_points(&shape, &mesh, &entry.points(&mesh)?);
+    let (points, places) = match &entry.correspondence {
+        Correspondence::Surface(_) => {
+            let on_input = entry.surface_points(&mesh)?;
+            let carried = carried_points(&on_input, &mesh, shape.mesh(), CARRIED_WITHIN);
+            let vertex = |p: &Option<SurfacePoint>| p.map_or(MISSING, |p| p.nearest_vertex(shape.mesh()));
+            (carried.iter().map(vertex).collect(), Some(Places::new(&carried, shape.mesh())))
+        }
+        _ => (work_points(&shape, &mesh, &entry.points(&mesh)?), None),
+    };
     let key = CacheKey::of(&[Shape::cache_key(&mesh, &options).as_bytes(), bytemuck::cast_slice(&points)]);
-    Ok((ProcessedShape { entry: entry.clone(), shape, points }, key))
+    Ok((ProcessedShape { entry: entry.clone(), shape, points, places }, key))
 }
 
 /// [`process`], and everything that minibatches need, which goes to the cache.
@@ -151,9 +199,12 @@ pub fn prepare(
     }
     let pool = Pool::cached(&processed, key, options, cache, observer)?;
     let jitter = jitter_neighbors(&processed, jitter);
-    let ProcessedShape { entry, points, .. } = processed;
-    Ok(PreparedShape { entry, points, pool, jitter, cache: cache.clone(), key: arrays_key })
+    let ProcessedShape { entry, points, places, .. } = processed;
+    Ok(PreparedShape { entry, points, places, pool, jitter, cache: cache.clone(), key: arrays_key })
 }
+
+/// A point of a decimated mesh is not farther from where it was than this, relative to sqrt(area).
+const CARRIED_WITHIN: f64 = 0.05;
 
 /// Kind of the cache's entries of [`ShapeArrays`].
 const ARRAYS: &str = "arrays";
@@ -298,7 +349,7 @@ impl Pool {
         if let Some(pool) = cache.fetch("pool", key, observer).and_then(|bytes| Self::decode(&bytes)) {
             return Ok(pool);
         }
-        let ProcessedShape { entry, shape, points } = processed;
+        let ProcessedShape { entry, shape, points, .. } = processed;
         let pool = timed(observer, &entry.name, "pool", || Self::compute(entry, shape, points, options));
         cache.put("pool", key, &pool.encode()).map_err(Error::from)?;
         Ok(pool)

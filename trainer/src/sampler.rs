@@ -8,7 +8,7 @@
 use crate::config::{Sampling, TrainConfig};
 use crate::dataset::MISSING;
 use crate::network::{DiffusionOptions, NetworkInput};
-use crate::precompute::{PrepareError, PreparedShape, ShapeArrays};
+use crate::precompute::{Places, PrepareError, PreparedShape, ShapeArrays};
 use crate::step::{AssignmentPoints, PairBatch, ShapeBatch};
 use fmnet::Matrix;
 use fmnet::diffusion_net::Operators;
@@ -16,13 +16,14 @@ use fmnet::fmap::{FmapError, pseudo_inverse};
 use rand::seq::{IndexedRandom, index};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Draws minibatches from prepared shapes.
 pub struct Sampler<'a> {
     shapes: &'a [PreparedShape],
-    /// Source and target of every pair that corresponds, both directions.
-    pairs: Vec<(usize, usize)>,
+    /// Source and target of every pair that corresponds, both directions, of each group; groups are drawn equally often.
+    pairs: Vec<Vec<(usize, usize)>>,
     config: &'a TrainConfig,
 }
 
@@ -84,24 +85,24 @@ impl<'a> Sampler<'a> {
     pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
         let sampler = Self { shapes, pairs: Vec::new(), config };
         let least = MIN_COMMON_POINTS.max(config.k);
-        let mut pairs = Vec::new();
+        let mut pairs: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
         for (source, s) in shapes.iter().enumerate() {
             for (target, t) in shapes.iter().enumerate() {
                 let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.is_part();
                 if corresponds && sampler.common_points(s, t).len() >= least {
-                    pairs.push((source, target));
+                    pairs.entry(&s.entry.group).or_default().push((source, target));
                 }
             }
         }
         match pairs.is_empty() {
             true => Err(SamplerError::NoPairs { shapes: shapes.len(), points: least }),
-            false => Ok(Self { pairs, ..sampler }),
+            false => Ok(Self { pairs: pairs.into_values().collect(), ..sampler }),
         }
     }
 
     /// Number of ordered pairs.
     pub fn n_pairs(&self) -> usize {
-        self.pairs.len()
+        self.pairs.iter().map(Vec::len).sum()
     }
 
     /// Minibatch number `index` of the run, from 0: one pair or several.
@@ -116,7 +117,8 @@ impl<'a> Sampler<'a> {
     }
 
     fn pair(&self, rng: &mut ChaCha8Rng) -> Result<PairBatch, SamplerError> {
-        let &(source, target) = self.pairs.choose(rng).expect("there are pairs");
+        let group = if self.pairs.len() > 1 { rng.random_range(0..self.pairs.len()) } else { 0 };
+        let &(source, target) = self.pairs[group].choose(rng).expect("a group has pairs");
         let (source, target) = (&self.shapes[source], &self.shapes[target]);
         let target_arrays = target.arrays()?;
         let (common, all) = self.draw(source, target, &target_arrays.mass, rng);
@@ -212,6 +214,7 @@ impl<'a> Sampler<'a> {
             if self.config.loss.soft_error > 0.0 { prepared.pool.distances(points) } else { None };
         match self.config.diffusion() {
             Some(options) => ShapeBatch {
+                places: prepared.places.as_ref().map(|places| places.select(points)),
                 basis: arrays.eigenvectors.first_cols(k),
                 mass: arrays.mass.clone(),
                 input: diffusion_input(options, arrays),
@@ -228,6 +231,7 @@ impl<'a> Sampler<'a> {
                 mass: vertices.iter().map(|&v| arrays.mass[v as usize]).collect(),
                 eigenvalues,
                 points: (0..vertices.len() as u32).collect(),
+                places: None,
                 distances,
             },
         }
@@ -238,10 +242,15 @@ impl<'a> Sampler<'a> {
         let [(source, _), (target, _)] = shapes;
         let points = self.common_points(source, target);
         let functions = shapes.map(|(prepared, arrays)| {
-            let row = |i: usize, j: usize| {
-                f64::from(arrays.eigenvectors[(prepared.points[points[i] as usize] as usize, j)])
+            let value = |vertex: u32, j: usize| f64::from(arrays.eigenvectors[(vertex as usize, j)]);
+            let at = |i: usize, j: usize| match &prepared.places {
+                None => value(prepared.points[points[i] as usize], j),
+                Some(Places { corners, weights }) => {
+                    let point = points[i] as usize;
+                    (0..3).map(|c| f64::from(weights[c][point]) * value(corners[c][point], j)).sum()
+                }
             };
-            Matrix::from_fn(points.len(), self.config.k, row)
+            Matrix::from_fn(points.len(), self.config.k, at)
         });
         let wrong = |error| SamplerError::GroundTruth {
             pair: format!("{} -> {}", source.entry.name, target.entry.name),

@@ -6,6 +6,7 @@ use crate::losses::{
 };
 use crate::network::{Network, NetworkInput, Statistics};
 use crate::optimizer::{Adam, AdamOptions};
+use crate::precompute::Places;
 use crate::projection::{WeightedBasis, project};
 use crate::soft_map::{SoftErrorInput, soft_error};
 use candle_core::{DType, Tensor, backprop::GradStore};
@@ -27,6 +28,8 @@ pub struct ShapeBatch {
     pub eigenvalues: Vec<f64>,
     /// The row of every point of the pair, `[m]`.
     pub points: Vec<u32>,
+    /// Where the points lie between vertices, for the contrastive loss; `None` where they are vertices.
+    pub places: Option<Places>,
     /// Geodesic distances between the points `[m, m]` in units of sqrt(area), for the soft error. Needed of the target; given
     /// of the source too, the pair is used in both directions at once, at the cost of little more than one.
     pub distances: Option<Matrix<f32>>,
@@ -272,8 +275,9 @@ impl Pass<'_> {
     /// Descriptors of the points that both shapes have, `[m, d]` each.
     fn common_points(&self) -> Result<[Tensor; 2], candle_core::Error> {
         let count = self.pair.source.points.len().min(self.pair.target.points.len());
-        let rows = |shape: &ShapeBatch, descriptors: &Tensor| {
-            descriptors.index_select(&indices(&shape.points[..count], descriptors)?, 0)
+        let rows = |shape: &ShapeBatch, descriptors: &Tensor| match &shape.places {
+            None => descriptors.index_select(&indices(&shape.points[..count], descriptors)?, 0),
+            Some(places) => interpolated(places, count, descriptors),
         };
         Ok([rows(&self.pair.source, self.descriptors[0])?, rows(&self.pair.target, self.descriptors[1])?])
     }
@@ -373,6 +377,16 @@ impl Pass<'_> {
             _ => candle_core::bail!("the soft error needs the distances of the target"),
         }
     }
+}
+
+/// The descriptors at the first `count` places, `[count, d]`.
+fn interpolated(places: &Places, count: usize, descriptors: &Tensor) -> Result<Tensor, candle_core::Error> {
+    let corner = |at: usize| {
+        let rows = descriptors.index_select(&indices(&places.corners[at][..count], descriptors)?, 0)?;
+        let weights = Tensor::from_slice(&places.weights[at][..count], (count, 1), descriptors.device())?;
+        rows.broadcast_mul(&weights)
+    };
+    (corner(0)? + corner(1)?)? + corner(2)?
 }
 
 fn indices(rows: &[u32], like: &Tensor) -> Result<Tensor, candle_core::Error> {
