@@ -107,13 +107,13 @@ struct Draft {
 impl Draft {
     fn damage(&mut self, plan: &Plan, edge: f64, rng: &mut ChaCha8Rng) -> Result<(), SimulateError> {
         let unit = self.mesh.scale();
-        for _ in 0..plan.cuts {
+        if plan.cuts > 0 {
             let adjacency = Topology::new(&self.mesh).adjacency();
-            let ends = extremities(&self.mesh, &adjacency, 6, rng);
-            let (end, radius) = (rng.random_range(0..ends.len().max(1)), unit * uniform(rng, 0.06, 0.2));
-            if let Some(&end) = ends.get(end) {
-                self.remove(&disc(&self.mesh, &adjacency, end, radius));
-            }
+            let mut ends = extremities(&self.mesh, &adjacency, 6, rng);
+            ends.shuffle(rng);
+            let beyond = |&end: &u32| disc(&self.mesh, &adjacency, end, unit * uniform(rng, 0.06, 0.18));
+            let removed: Vec<u32> = ends.iter().take(plan.cuts).flat_map(beyond).collect();
+            self.remove(&removed);
         }
         for _ in 0..plan.holes {
             let adjacency = Topology::new(&self.mesh).adjacency();

@@ -148,6 +148,8 @@ fn split(places: &[Place], quads: &[[u32; 4]], rng: &mut impl Rng) -> Mesh {
     let style = styles[rng.random_range(0..styles.len())];
     let position = |i: u32| places[i as usize].position;
     let length = |i: u32, j: u32| vec3::distance(position(i), position(j));
+    let mut around = vec![0; places.len()];
+    quads.iter().for_each(|quad| around[quad[0] as usize] += 1);
     let mut faces = Vec::with_capacity(2 * quads.len());
     for &[a, b, c, d] in quads {
         let first = match style {
@@ -169,7 +171,9 @@ fn split(places: &[Place], quads: &[[u32; 4]], rng: &mut impl Rng) -> Mesh {
             });
             uprights[0].min(uprights[1])
         };
-        faces.extend(halves(first == (upright(first) > 0.2 || upright(first) >= upright(!first))));
+        let first = first == (upright(first) > 0.2 || upright(first) >= upright(!first));
+        // Two quadrilaterals alone around a corner share both of its edges; the diagonal between these would be the same edge.
+        faces.extend(halves(first || around[a as usize] == 2));
     }
     let vertices = places.iter().map(|place| place.position).collect();
     Mesh::new(vertices, faces).expect("places on a valid mesh are finite")

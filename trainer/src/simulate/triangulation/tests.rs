@@ -68,6 +68,17 @@ fn every_manner_gives_a_manifold_on_the_surface() {
 }
 
 #[test]
+fn quadrilaterals_split_in_any_style_are_a_manifold() {
+    let mesh = bumpy_sphere(4, 2);
+    for index in 0..8 {
+        let made = made(&mesh, &whole(Manner::Quads, 1500), index).mesh;
+        let topology = Topology::new(&made);
+        assert!(topology.is_closed() && topology.is_manifold(), "{index}");
+        assert_eq!(topology.euler_characteristic(), 2, "{index}");
+    }
+}
+
+#[test]
 fn triangulations_have_the_character_of_their_manner() {
     let mesh = torus(90, 40, 0.25);
     let areas = |manner| {
