@@ -62,6 +62,11 @@ impl Quat {
         vec3::add(vec3::add(p, vec3::scale(t, w)), vec3::cross(v, t))
     }
 
+    /// Angle of the rotation, in [0, pi].
+    pub(super) fn angle(self) -> f64 {
+        2.0 * self.0[0].abs().min(1.0).acos()
+    }
+
     /// The same rotation seen in a mirror at the plane x = 0.
     pub(super) fn mirrored(self) -> Self {
         let [w, x, y, z] = self.0;
@@ -131,6 +136,14 @@ mod tests {
     fn rotation_turns_x_to_y_about_z() {
         let p = Quat::z(90.0).rotate([1.0, 0.0, 0.0]);
         assert!(vec3::distance(p, [0.0, 1.0, 0.0]) < 1e-15);
+    }
+
+    #[test]
+    fn angle_of_a_rotation_is_what_it_was_made_with() {
+        for degrees in [0.0, 40.0, 175.0] {
+            assert!((Quat::y(degrees).angle().to_degrees() - degrees).abs() < 1e-6);
+            assert!((Quat::y(-degrees).angle().to_degrees() - degrees).abs() < 1e-6);
+        }
     }
 
     #[test]

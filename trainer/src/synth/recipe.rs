@@ -42,6 +42,8 @@ pub(super) struct Recipe {
     pub(super) magnified: Vec<f64>,
     /// Grid spacing of the template, a length.
     pub(super) cell: f64,
+    /// Bones that clothes keep near their rest.
+    pub(super) bound: Vec<usize>,
     /// How much larger the body is than it was modelled.
     pub(super) scale: f64,
 }
@@ -61,7 +63,7 @@ impl Recipe {
     /// Nothing yet; `cell` is the grid spacing of the template.
     pub(super) fn new(cell: f64) -> Self {
         let (skeleton, parts, features) = Default::default();
-        Self { skeleton, parts, features, magnified: Vec::new(), cell, scale: 1.0 }
+        Self { skeleton, parts, features, magnified: Vec::new(), cell, bound: Vec::new(), scale: 1.0 }
     }
 
     /// Adds a round spindle from `a` to `b`.

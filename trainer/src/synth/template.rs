@@ -21,6 +21,8 @@ const BREED_TRIALS: u8 = 12;
 const POSE_TRIALS: usize = 24;
 /// Self-penetration, relative to the thinner limb's radius, that a pose may have.
 const PENETRATION: f64 = 0.4;
+/// Angle from rest, in radians, that clothes leave to the bones they bind.
+const FREE: f64 = 0.7;
 
 /// The body that individuals of one breed of a species are made from. Building one takes about a second, an individual
 /// less; so build it once for several individuals.
@@ -125,9 +127,10 @@ impl Template {
                 (Family::Quadruped, Stance::Posed) => gait::random_quadruped(&mut rng),
                 (Family::Quadruped, _) => gait::resting_quadruped(&mut rng),
             };
-            let penetration = self.proxies.penetration(skeleton, shape, &rotations);
-            if penetration < best.0 {
-                best = (penetration, rotations);
+            let strain = self.recipe.bound.iter().map(|&bone| (rotations[bone].angle() - FREE).max(0.0));
+            let fault = self.proxies.penetration(skeleton, shape, &rotations) + 2.0 * strain.sum::<f64>();
+            if fault < best.0 {
+                best = (fault, rotations);
             }
             if best.0 < PENETRATION {
                 break;

@@ -156,7 +156,9 @@ impl Sculptor {
             [0.92, wide, deep + 0.4 * to.belly, deep],
             [1.07, 0.148 * to.waist, 0.1 * to.waist + to.belly, 0.09 * to.waist],
         ];
-        self.garment(&[PELVIS, limb(THIGH, 0), limb(THIGH, 1)], &sections, 0.008);
+        let thighs = [limb(THIGH, 0), limb(THIGH, 1)];
+        self.garment(&[PELVIS, thighs[0], thighs[1]], &sections, 0.008);
+        self.recipe.bound.extend(thighs);
     }
 
     fn trousers(&mut self, [loose, length, hem]: [f64; 3]) {
