@@ -169,17 +169,18 @@ fn diffusion_input(options: &DiffusionOptions, mesh: &Mesh) -> Input {
         split: Split::Train,
         whole: None,
     };
-    let shape = fmnet::shape::ShapeOptions { k: options.eigenpairs(), ..Default::default() };
     let prepare = PrepareOptions {
-        shape,
+        shape: fmnet::shape::ShapeOptions::default(),
+        k: options.eigenpairs(),
         gradients: options.eigenfunctions,
-        shot: true,
+        shot: Some(ShotOptions::default()),
         distances: false,
         pool: 100,
         seed: 1,
     };
-    let processed = process(&entry, &prepare.shape, None, &fmnet::events::ignore).unwrap();
-    let arrays = ShapeArrays::of(&processed.shape, &prepare);
+    let context = fmnet::shape::Context::SILENT;
+    let processed = process(&entry, &prepare.shape, context).unwrap();
+    let arrays = ShapeArrays::of(&processed.shape, &prepare, context).unwrap();
     let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect::<Vec<f32>>();
     let named = vec![
         (Quantity::Shot, arrays.shot.data().to_vec()),

@@ -60,17 +60,6 @@ pub enum Error {
         /// The area given.
         area: f64,
     },
-    /// A shape was described with too few eigenpairs to be matched, by another matcher.
-    #[error(
-        "described with {found} eigenpairs, but the matcher takes {expected}; describe the shape with the matcher that \
-         matches it"
-    )]
-    TooFewEigenpairs {
-        /// Eigenpairs of the shape.
-        found: usize,
-        /// Eigenpairs that the matcher takes.
-        expected: usize,
-    },
     /// Any of these, on a known shape or pair.
     #[error("{shape}: {source}")]
     InShape {

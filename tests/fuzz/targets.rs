@@ -14,7 +14,7 @@ use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::network::contract::ModelInput;
 use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet::point_map::PointMap;
-use fmnet::shape::{Shape, ShapeOptions};
+use fmnet::shape::{Context, Shape, ShapeOptions};
 use fmnet::{Matrix, Mesh};
 use fmnet_tests::test_metadata;
 use fmnet_trainer::checkpoint::Checkpoint;
@@ -231,16 +231,15 @@ fn shapes(folder: &Path) -> Target {
         write_mesh(&path, &mesh, &Attributes::default()).unwrap();
         std::fs::read(&path).unwrap()
     });
-    let options = ShapeOptions {
-        k: 6,
-        decimate: Some(60),
-        shot: ShotOptions { radius: 0.3, ..Default::default() },
-        ..ShapeOptions::default()
-    };
+    let options = ShapeOptions { decimate: Some(60), ..ShapeOptions::default() };
+    let shot = ShotOptions { radius: 0.3, ..Default::default() };
     let target = Target::new(seeds.collect(), move |bytes| {
         let Ok(file) = decode_mesh(bytes, Path::new("a.off")) else { return false };
         inspect(&file.mesh);
-        Shape::process("fuzz", &file.mesh, &options, &ignore).is_ok()
+        let context = Context::SILENT;
+        Shape::new("fuzz", &file.mesh, &options, context)
+            .and_then(|shape| Ok((shape.gradients(6, context)?, shape.shot(&shot, context)?)))
+            .is_ok()
     });
     target.with_memory(256 << 20)
 }
@@ -387,13 +386,21 @@ fn checkpoints(folder: &Path) -> Target {
 /// Entries whose checksum is right and whose content is not.
 fn cache_entries(folder: &Path) -> Target {
     let cache = Cache::open(folder).unwrap();
-    let (mesh, options) = (bumpy_sphere(1, 1), ShapeOptions { k: 4, ..ShapeOptions::default() });
-    Shape::process_cached("seed", &mesh, &options, Some(&cache), &ignore).unwrap();
-    let key = Shape::cache_key(&mesh, &options);
-    let Lookup::Hit(payload) = cache.get("shape", key) else { panic!("the shape was not kept") };
+    let mesh = bumpy_sphere(1, 1);
+    let describe = |cache: &Cache| {
+        let context = Context { cache: Some(cache), observer: &ignore };
+        let shape = Shape::new("fuzz", &mesh, &ShapeOptions::default(), context)?;
+        shape.unit_basis(4, context)?;
+        Ok::<_, fmnet::Error>(shape.key())
+    };
+    let key = describe(&cache).unwrap();
+    let Lookup::Hit(payload) = cache.get("mesh", key) else { panic!("the shape was not kept") };
+    let mesh = mesh.clone();
     let target = Target::new(vec![payload], move |bytes| {
-        cache.put("shape", key, bytes).unwrap();
-        Shape::process_cached("fuzz", &mesh, &options, Some(&cache), &ignore).is_ok()
+        cache.put("mesh", key, bytes).unwrap();
+        let context = Context { cache: Some(&cache), observer: &ignore };
+        let shape = Shape::new("fuzz", &mesh, &ShapeOptions::default(), context);
+        shape.is_ok_and(|shape| shape.unit_basis(4, context).is_ok())
     });
     target.with_memory(64 << 20)
 }

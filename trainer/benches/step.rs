@@ -61,6 +61,7 @@ fn shape(kind: Kind, points: usize, generator: &mut ChaCha8Rng, distances: bool)
         mass,
         eigenvalues: (0..k).map(|l| 12.6 * l as f64).collect(),
         points: (0..drawn as u32).collect(),
+        places: None,
         distances: distances.then(|| Matrix::from_fn(points, points, |_, _| random(0.0, 1.5))),
     }
 }

@@ -335,13 +335,17 @@ impl TrainConfig {
 
     /// How shapes are processed.
     pub fn shape_options(&self) -> ShapeOptions {
-        let eigenpairs = self.diffusion().map_or(0, DiffusionOptions::eigenpairs);
-        ShapeOptions {
-            decimate: Some(self.decimate).filter(|&n| n > 0),
-            k: self.k.max(eigenpairs),
-            shot: ShotOptions { radius: self.shot_radius, ..ShotOptions::default() },
-            whole_area: None,
-        }
+        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), whole_area: None }
+    }
+
+    /// How SHOT is computed.
+    pub fn shot_options(&self) -> ShotOptions {
+        ShotOptions { radius: self.shot_radius, ..ShotOptions::default() }
+    }
+
+    /// Eigenpairs that network and functional map need of each shape.
+    pub fn eigenpairs(&self) -> usize {
+        self.k.max(self.diffusion().map_or(0, DiffusionOptions::eigenpairs))
     }
 
     /// The settings of the DiffusionNet; `None` for the residual network.

@@ -10,11 +10,11 @@
 
 use crate::dataset::{Correspondence, DatasetError, MISSING, ShapeEntry};
 use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
+use fmnet::descriptor::ShotOptions;
 use fmnet::events::{Observer, timed};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::mesh::{SurfacePoint, Topology, carried_points, nearest_k_vertices, nearest_vertices};
-use fmnet::shape::{Shape, ShapeOptions};
-use fmnet::spectral::eigen_gradients;
+use fmnet::shape::{Context, Shape, ShapeOptions, WayBack};
 use fmnet::{Error, Matrix, Mesh};
 use rand::SeedableRng;
 use rand::seq::index;
@@ -24,12 +24,14 @@ use thiserror::Error;
 /// Settings of [`prepare`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrepareOptions {
-    /// Decimation, basis and descriptor.
+    /// Decimation.
     pub shape: ShapeOptions,
+    /// Eigenpairs of each shape.
+    pub k: usize,
     /// Eigenfunctions whose gradients are computed, at most as many as the shape has; 0: none.
     pub gradients: usize,
-    /// Whether SHOT descriptors are kept.
-    pub shot: bool,
+    /// SHOT descriptors; `None`: no network takes them.
+    pub shot: Option<ShotOptions>,
     /// Whether geodesic distances between the points of the pools are computed.
     pub distances: bool,
     /// Points in the pool of a group. Range 100 and up.
@@ -38,13 +40,12 @@ pub struct PrepareOptions {
     pub seed: u64,
 }
 
-/// A shape as the runtime processed it, and where the points of its group lie on it.
-#[derive(Clone, Debug, PartialEq)]
+/// A shape as the runtime processes it, and where the points of its group lie on it.
+#[derive(Clone, Debug)]
 pub struct ProcessedShape {
     /// Where it comes from.
     pub entry: ShapeEntry,
-    /// Mesh, basis and descriptors. Unlike the mesh, the basis is that of the shape scaled to unit area, a part as its whole
-    /// ([`Shape::unit_basis`]).
+    /// Mesh and quantities.
     pub shape: Shape,
     /// Vertex of the working mesh of every point of the group, `[points]`, [`MISSING`] where the shape lacks it.
     pub points: Vec<u32>,
@@ -150,22 +151,11 @@ pub enum PrepareError {
 pub fn process(
     entry: &ShapeEntry,
     options: &ShapeOptions,
-    cache: Option<&Cache>,
-    observer: Observer,
+    context: Context,
 ) -> Result<ProcessedShape, PrepareError> {
-    Ok(process_with_key(entry, options, cache, observer)?.0)
-}
-
-fn process_with_key(
-    entry: &ShapeEntry,
-    options: &ShapeOptions,
-    cache: Option<&Cache>,
-    observer: Observer,
-) -> Result<(ProcessedShape, CacheKey), PrepareError> {
     let mesh = entry.read()?;
     let options = ShapeOptions { whole_area: entry.whole_area()?, ..options.clone() };
-    let mut shape = Shape::process_cached(&entry.name, &mesh, &options, cache, observer)?;
-    shape.basis = shape.unit_basis(shape.basis.k());
+    let shape = Shape::new(&entry.name, &mesh, &options, context)?;
     let (points, places) = match &entry.correspondence {
         Correspondence::Surface(_) => {
             let on_input = entry.surface_points(&mesh)?;
@@ -175,8 +165,7 @@ fn process_with_key(
         }
         _ => (work_points(&shape, &mesh, &entry.points(&mesh)?), None),
     };
-    let key = CacheKey::of(&[Shape::cache_key(&mesh, &options).as_bytes(), bytemuck::cast_slice(&points)]);
-    Ok((ProcessedShape { entry: entry.clone(), shape, points, places }, key))
+    Ok(ProcessedShape { entry: entry.clone(), shape, points, places })
 }
 
 /// [`process`], and everything that minibatches need, which goes to the cache.
@@ -190,11 +179,15 @@ pub fn prepare(
     cache: &Cache,
     observer: Observer,
 ) -> Result<PreparedShape, PrepareError> {
-    let (processed, key) = process_with_key(entry, &options.shape, Some(cache), observer)?;
-    let flags = [options.gradients as u64, u64::from(options.shot)];
-    let arrays_key = CacheKey::of(&[key.as_bytes(), bytemuck::cast_slice(&flags)]);
+    let processed = process(entry, &options.shape, Context { cache: None, observer })?;
+    let mesh_key = processed.shape.key();
+    let key = CacheKey::of(&[mesh_key.as_bytes(), bytemuck::cast_slice(&processed.points)]);
+    let sizes = [options.k as u64, options.gradients as u64, ARRAYS_VERSION];
+    let shot = serde_json::to_vec(&options.shot).unwrap_or_default();
+    let arrays_key = CacheKey::of(&[mesh_key.as_bytes(), bytemuck::cast_slice(&sizes), &shot]);
     if cache.fetch(ARRAYS, arrays_key, observer).and_then(|bytes| ShapeArrays::decode(&bytes)).is_none() {
-        let arrays = timed(observer, &entry.name, "operators", || ShapeArrays::of(&processed.shape, options));
+        // The arrays hold all that is needed of the quantities: those are not kept a second time.
+        let arrays = ShapeArrays::of(&processed.shape, options, Context { cache: None, observer })?;
         cache.put(ARRAYS, arrays_key, &arrays.encode()).map_err(Error::from)?;
     }
     let pool = Pool::cached(&processed, key, options, cache, observer)?;
@@ -208,6 +201,8 @@ const CARRIED_WITHIN: f64 = 0.05;
 
 /// Kind of the cache's entries of [`ShapeArrays`].
 const ARRAYS: &str = "arrays";
+/// Raise where the arrays of the same shape change.
+const ARRAYS_VERSION: u64 = 1;
 
 impl PreparedShape {
     /// Reads the arrays from the cache.
@@ -224,27 +219,30 @@ impl PreparedShape {
 }
 
 impl ShapeArrays {
-    /// The arrays of a shape whose basis is at unit area.
-    pub fn of(shape: &Shape, options: &PrepareOptions) -> Self {
-        let basis = &shape.basis;
+    /// The arrays of a shape.
+    ///
+    /// # Errors
+    /// If a quantity cannot be computed.
+    pub fn of(shape: &Shape, options: &PrepareOptions, context: Context) -> Result<Self, Error> {
+        let basis = shape.unit_basis(options.k, context)?;
         let single = |matrix: &Matrix| matrix.map(|x| x as f32);
         let (mut gradients_x, mut gradients_y) = (Matrix::default(), Matrix::default());
         if options.gradients > 0 {
-            let first = basis.truncated(options.gradients.min(basis.k()));
-            // At unit area lengths are in units of sqrt(area).
-            let unit = (shape.mesh().area() / basis.area()).sqrt();
-            let gradients = eigen_gradients(shape.mesh(), &first);
-            let scaled = |matrix: &Matrix| matrix.map(|x| (x * unit) as f32);
-            (gradients_x, gradients_y) = (scaled(&gradients.x), scaled(&gradients.y));
+            let gradients = shape.gradients(options.gradients, context)?;
+            (gradients_x, gradients_y) = (single(&gradients.x), single(&gradients.y));
         }
-        Self {
+        let shot = match &options.shot {
+            Some(shot) => shape.shot(shot, context)?.as_ref().clone(),
+            None => Matrix::default(),
+        };
+        Ok(Self {
             mass: basis.mass.iter().map(|&m| m as f32).collect(),
-            eigenvalues: basis.eigenvalues.clone(),
             eigenvectors: single(&basis.eigenvectors),
+            eigenvalues: basis.eigenvalues,
             gradients_x,
             gradients_y,
-            shot: if options.shot { shape.shot.clone() } else { Matrix::default() },
-        }
+            shot,
+        })
     }
 
     /// Number of vertices.
@@ -295,12 +293,12 @@ pub struct Pool {
 
 /// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the nearest.
 fn work_points(shape: &Shape, mesh: &Mesh, input_points: &[u32]) -> Vec<u32> {
-    let work_of_input = shape.work_of_input();
+    let work_of_input = shape.way_back.work_of_input();
     let lost: Vec<u32> = input_points
         .iter()
         .copied()
-        .filter(|&v| v != MISSING && work_of_input[v as usize] == Shape::NONE)
-        .filter(|&v| shape.full_of_input[v as usize] != Shape::NONE)
+        .filter(|&v| v != MISSING && work_of_input[v as usize] == WayBack::NONE)
+        .filter(|&v| shape.way_back.full_of_input[v as usize] != WayBack::NONE)
         .collect();
     let positions: Vec<[f64; 3]> = lost.iter().map(|&v| mesh.vertices()[v as usize]).collect();
     let nearest: BTreeMap<u32, u32> =

@@ -208,13 +208,19 @@ fn prepare_entries(
 
 /// What is prepared of each shape for a run.
 pub fn prepare_options(config: &TrainConfig) -> PrepareOptions {
-    let (gradients, shot) = match &config.network {
+    let (gradients, takes_shot) = match &config.network {
         NetworkOptions::Residual(_) => (0, true),
         NetworkOptions::Diffusion(options) => (options.eigenfunctions, options.takes_shot()),
     };
-    let distances = config.loss.soft_error > 0.0;
-    let (shape, pool, seed) = (config.shape_options(), config.pool, config.seed);
-    PrepareOptions { shape, gradients, shot, distances, pool, seed }
+    PrepareOptions {
+        shape: config.shape_options(),
+        k: config.eigenpairs(),
+        gradients,
+        shot: takes_shot.then(|| config.shot_options()),
+        distances: config.loss.soft_error > 0.0,
+        pool: config.pool,
+        seed: config.seed,
+    }
 }
 
 /// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may

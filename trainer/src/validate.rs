@@ -4,7 +4,7 @@ use crate::config::TrainConfig;
 use crate::dataset::{MISSING, ShapeEntry};
 use crate::events::{TrainEvent, TrainObserver};
 use crate::network::{Network, NetworkInput, NetworkOptions};
-use crate::precompute::{ProcessedShape, ShapeArrays, process};
+use crate::precompute::{PrepareError, ProcessedShape, ShapeArrays, process};
 use crate::sampler::diffusion_input;
 use crate::train::{TrainError, prepare_options};
 use candle_core::Device;
@@ -14,6 +14,8 @@ use fmnet::diffusion_net::Operators;
 use fmnet::events::Event;
 use fmnet::fmap::{FmapSolver, functional_maps};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
+use fmnet::shape::Context;
+use fmnet::spectral::Eigenbasis;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +27,8 @@ const POINTS: usize = 1000;
 struct HeldOut {
     processed: ProcessedShape,
     input: NetworkInput,
+    /// At unit area.
+    basis: Eigenbasis,
     /// Geodesic distances, of targets.
     solver: Option<GeodesicSolver>,
 }
@@ -70,13 +74,15 @@ impl Validation {
         };
         let mut shapes = Vec::with_capacity(used.len());
         for &entry in &used {
-            let processed = process(&entries[entry], &options.shape, Some(&cache), &warn)?;
-            let arrays = ShapeArrays::of(&processed.shape, &options);
+            let context = Context { cache: Some(&cache), observer: &warn };
+            let processed = process(&entries[entry], &options.shape, context)?;
+            let arrays = ShapeArrays::of(&processed.shape, &options, context).map_err(PrepareError::from)?;
             let input = network_input(&config.network, arrays);
+            let basis = processed.shape.unit_basis(config.k, context).map_err(PrepareError::from)?;
             let is_target = drawn.iter().any(|&(_, t)| t == entry);
             let solver =
                 is_target.then(|| GeodesicSolver::new(processed.shape.mesh(), &GeodesicOptions::default()));
-            shapes.push(HeldOut { processed, input, solver });
+            shapes.push(HeldOut { processed, input, basis, solver });
         }
         let pairs = drawn.iter().map(|(s, t)| (position[s], position[t])).collect();
         Ok(Self { shapes, pairs })
@@ -111,14 +117,13 @@ impl Validation {
     ) -> anyhow::Result<Vec<f32>> {
         let (source, target) = (&self.shapes[source], &self.shapes[target]);
         let (s, t) = (&source.processed, &target.processed);
-        let (basis_source, basis_target) =
-            (s.shape.basis.truncated(config.k), t.shape.basis.truncated(config.k));
+        let (basis_source, basis_target) = (&source.basis, &target.basis);
         let f = basis_source.project(&descriptors(network, &source.input)?);
         let g = basis_target.project(&descriptors(network, &target.input)?);
         let solver = config.fmap_solver().for_matching();
         let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
-        let (maps, _) = functional_maps(&basis_source, &basis_target, &f, &g, solver)?;
-        let map = maps.point_map(solver.comparison(), &basis_source, &basis_target)?;
+        let (maps, _) = functional_maps(basis_source, basis_target, &f, &g, solver)?;
+        let map = maps.point_map(solver.comparison(), basis_source, basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))
             .filter(|&(&a, &b)| a != MISSING && b != MISSING)
             .map(|(&a, &b)| (a, b))

@@ -15,7 +15,7 @@ mod test_shapes;
 mod wks;
 
 pub use basis::Eigenbasis;
-pub use eigen::{EigenError, EigenInfo, EigenOptions, eigenbasis};
+pub use eigen::{EigenError, EigenInfo, EigenOptions, eigenbasis, max_eigenpairs};
 pub use gradients::{EigenGradients, eigen_gradients};
 pub use laplacian::Laplacian;
 pub use mass::lumped_mass;

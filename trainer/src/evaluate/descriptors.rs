@@ -3,7 +3,7 @@
 use super::{DescriptorFigures, EvaluateOptions};
 use fmnet::eval::{EvalError, GroundTruth, cmc_curve, correct_match_distances, match_ranks};
 use fmnet::pipeline::DescribedShape;
-use fmnet::shape::Shape;
+use fmnet::shape::{Shape, WayBack};
 
 /// The figures of a pair.
 pub(super) fn figures(
@@ -37,10 +37,10 @@ fn on_working_meshes(
     target: &Shape,
     points: usize,
 ) -> Result<GroundTruth, EvalError> {
-    let (work_source, work_target) = (source.work_of_input(), target.work_of_input());
+    let (work_source, work_target) = (source.way_back.work_of_input(), target.way_back.work_of_input());
     let pairs: Vec<(u32, u32)> = (truth.pairs().iter())
         .map(|&(s, t)| (work_source[s as usize], work_target[t as usize]))
-        .filter(|&(s, t)| s != Shape::NONE && t != Shape::NONE)
+        .filter(|&(s, t)| s != WayBack::NONE && t != WayBack::NONE)
         .collect();
     let stride = pairs.len().div_ceil(points.max(1)).max(1);
     let pairs = pairs.into_iter().step_by(stride).collect();

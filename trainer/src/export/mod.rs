@@ -54,7 +54,7 @@ pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata 
     let datasets = || config.dataset.0.iter().map(folder_name).collect::<Vec<_>>().join(", ");
     ModelMetadata {
         format_version: FORMAT_VERSION,
-        shot: shape.shot,
+        shot: config.shot_options(),
         k: config.k,
         solver: config.fmap_solver(),
         decimate: shape.decimate,

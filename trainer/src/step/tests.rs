@@ -23,6 +23,7 @@ fn shape(seed: u64, signal: &[f64]) -> ShapeBatch {
     ShapeBatch {
         input: NetworkInput { features: Matrix::from_vec(POINTS, WIDTH, shot), ..NetworkInput::default() },
         points: (0..POINTS as u32).collect(),
+        places: None,
         basis: Matrix::from_fn(POINTS, K, |i, l| cosine(i, l) as f32),
         mass: vec![1.0 / POINTS as f32; POINTS],
         eigenvalues: (0..K).map(|l| (std::f64::consts::PI * l as f64).powi(2)).collect(),

@@ -197,13 +197,18 @@ pub fn eigenbasis(
     if n == 0 {
         return Err(EigenError::NoVertices);
     }
-    let limit = if n <= DENSE_AT_MOST { n } else { n / MANY };
+    let limit = max_eigenpairs(n);
     if k == 0 || k > limit {
         return Err(EigenError::TooManyPairs { k, n, limit });
     }
     let pencil = Pencil::new(laplacian)?;
     let found = solve(&pencil, k, options)?;
     Ok(finish(&pencil, laplacian, k, found))
+}
+
+/// Most eigenpairs that are computed for a mesh of `n` vertices: all up to 3000, a sixth of more.
+pub fn max_eigenpairs(n: usize) -> usize {
+    if n <= DENSE_AT_MOST { n } else { n / MANY }
 }
 
 /// The solver that suits the size of the problem.

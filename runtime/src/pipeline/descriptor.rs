@@ -1,0 +1,103 @@
+//! Descriptors behind one trait: what each needs of a shape, and the matrix that it gives.
+
+use crate::Matrix;
+use crate::cache::{CacheKey, Decoder, Encoder};
+use crate::descriptor::ShotOptions;
+use crate::error::Error;
+use crate::events::timed;
+use crate::network::DescriptorNetwork;
+use crate::network::contract::{ModelInput, Quantity};
+use crate::shape::{Context, Shape};
+
+/// Pointwise descriptors of a shape.
+pub trait Descriptor: Send + Sync {
+    /// Eigenpairs that it needs of a shape, 0 where none.
+    fn eigenpairs(&self) -> usize;
+
+    /// A value for each vertex of [`Shape::mesh`], `[n, d]`. Quantities are taken from the shape, which computes those that
+    /// are asked for.
+    ///
+    /// # Errors
+    /// If a quantity that it needs cannot be computed, or the descriptor itself fails; it names the shape.
+    fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error>;
+}
+
+/// SHOT itself: the paper's baseline.
+impl Descriptor for ShotOptions {
+    fn eigenpairs(&self) -> usize {
+        0
+    }
+
+    fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error> {
+        Ok(shape.shot(self, context)?.as_ref().clone())
+    }
+}
+
+/// Descriptors by a network of a model file.
+#[derive(Debug)]
+pub struct NetworkDescriptor {
+    /// The network.
+    pub network: DescriptorNetwork,
+    /// SHOT, if it takes it.
+    pub shot: ShotOptions,
+}
+
+/// Raise where the inputs of networks change.
+const INPUTS_VERSION: u32 = 1;
+
+impl Descriptor for NetworkDescriptor {
+    fn eigenpairs(&self) -> usize {
+        self.network.contract().eigenpairs()
+    }
+
+    fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error> {
+        let backend = self.network.backend().to_string();
+        let shot = serde_json::to_vec(&self.shot).unwrap_or_default();
+        let options = [self.network.fingerprint().as_slice(), backend.as_bytes(), &shot].concat();
+        let key: CacheKey = shape.quantity_key("descriptors", INPUTS_VERSION, &options);
+        let found = context.cache.and_then(|cache| cache.fetch("descriptors", key, context.observer));
+        if let Some(descriptors) = found
+            .and_then(|bytes| Decoder::new(&bytes).matrix())
+            .filter(|m: &Matrix<f32>| (m.rows(), m.cols()) == (shape.n(), self.network.contract().outputs))
+        {
+            return Ok(descriptors);
+        }
+        let inputs = self.inputs(shape, context)?;
+        let arrays: Vec<&[f32]> = inputs.iter().map(|(_, values)| values.as_slice()).collect();
+        let run = || self.network.descriptors(shape.n(), &arrays);
+        let descriptors = timed(context.observer, &shape.name, "network", run)
+            .map_err(|e| Error::from(e).in_shape(&shape.name))?;
+        let mut out = Encoder::default();
+        out.matrix(&descriptors);
+        shape.keep("descriptors", key, &out.finish(), context)?;
+        Ok(descriptors)
+    }
+}
+
+impl NetworkDescriptor {
+    /// The network's inputs in its order, each row-major in single precision, at unit area.
+    ///
+    /// # Errors
+    /// If a quantity cannot be computed; it names the shape.
+    pub fn inputs(&self, shape: &Shape, context: Context) -> Result<Vec<(ModelInput, Vec<f32>)>, Error> {
+        // Asked for once at its largest, the eigenbasis serves every smaller one.
+        let pairs = self.eigenpairs();
+        if pairs > 0 {
+            shape.eigenbasis(pairs, context)?;
+        }
+        let inputs = &self.network.contract().inputs;
+        inputs.iter().map(|&input| Ok((input, self.input(input, shape, context)?))).collect()
+    }
+
+    fn input(&self, input: ModelInput, shape: &Shape, context: Context) -> Result<Vec<f32>, Error> {
+        let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect();
+        Ok(match input.quantity {
+            Quantity::Shot => shape.shot(&self.shot, context)?.data().to_vec(),
+            Quantity::Mass => single(&shape.unit_basis(1, context)?.mass),
+            Quantity::Eigenvalues => single(&shape.unit_basis(input.width, context)?.eigenvalues),
+            Quantity::Eigenvectors => single(shape.unit_basis(input.width, context)?.eigenvectors.data()),
+            Quantity::GradientsX => single(shape.gradients(input.width, context)?.x.data()),
+            Quantity::GradientsY => single(shape.gradients(input.width, context)?.y.data()),
+        })
+    }
+}

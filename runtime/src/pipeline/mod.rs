@@ -1,0 +1,269 @@
+//! The order of the stages at deployment: two meshes in, a dense map out.
+//!
+//! ```text
+//! each shape:  repair -> decimate                                          (Shape::new)
+//!              -> quantities that the descriptor asks for -> descriptor    (Matcher::describe)
+//! a pair:      functional maps -> point map -> refine -> upscale           (Matcher::match_shapes)
+//!              -> the map in the input's vertices
+//! ```
+//!
+//! Refinement comes before upscaling: it needs many iterations, which are cheap on the decimated shapes.
+
+mod descriptor;
+mod options;
+mod pair;
+
+use crate::cache::Cache;
+use crate::descriptor::ShotOptions;
+use crate::error::Error;
+use crate::events::Observer;
+use crate::fmap::{FmapInfo, FmapSolver};
+use crate::network::DescriptorNetwork;
+use crate::point_map::PointMap;
+use crate::refine::PmfInfo;
+use crate::shape::{Context, Shape, ShapeOptions};
+use crate::upscale::AdmmInfo;
+use crate::{Matrix, Mesh};
+use pair::Pair;
+use std::path::Path;
+
+pub use descriptor::{Descriptor, NetworkDescriptor};
+pub use options::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
+
+/// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
+const SHOT_K: usize = 120;
+/// The model that is built into the library.
+const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
+
+/// A shape with its descriptors.
+#[derive(Clone, Debug)]
+pub struct DescribedShape {
+    /// The processed shape.
+    pub shape: Shape,
+    /// Descriptors of its working mesh, `[n, d]`.
+    pub descriptors: Matrix<f32>,
+    /// Eigenfunctions that refinement uses: small meshes do not have so many as it would like.
+    refined_k: usize,
+}
+
+/// The result for a pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Match {
+    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source; those that repair dropped are
+    /// unmatched.
+    pub map: PointMap,
+    /// The functional map of the working meshes, `[k, k]` (target x source), before refinement; between bases at unit area
+    /// ([`Shape::unit_basis`]).
+    pub functional_map: Matrix,
+    /// How its solution went.
+    pub functional_map_info: FmapInfo,
+    /// How the product manifold filter went, where it ran.
+    pub pmf_info: Option<PmfInfo>,
+    /// How the upscaling went, where there was one.
+    pub upscale_info: Option<AdmmInfo>,
+}
+
+/// Matches shapes; loads the model once.
+#[derive(Debug)]
+pub struct Matcher {
+    shape_options: ShapeOptions,
+    /// Eigenfunctions of the functional map.
+    k: usize,
+    /// Of whole shapes, and of a part and its whole.
+    solver: FmapSolver,
+    part_solver: FmapSolver,
+    /// What was asked for; `None`: what suits the solver.
+    refinement: Option<Refinement>,
+    upscaling: Upscaling,
+    shot: ShotOptions,
+    network: Option<NetworkDescriptor>,
+    cache: Option<Cache>,
+}
+
+impl Matcher {
+    /// Loads the model and settles every option.
+    ///
+    /// # Errors
+    /// If the model cannot be read or breaks its contract, this build lacks the back-end, or the cache's folder cannot be
+    /// made.
+    pub fn new(options: &MatchOptions) -> Result<Self, Error> {
+        let network = match (options.descriptor, &options.model) {
+            (DescriptorKind::Shot, _) => None,
+            (_, ModelSource::File(path)) => Some(DescriptorNetwork::load(path, options.backend)?),
+            (_, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
+                Path::new("embedded model"),
+                EMBEDDED_MODEL,
+                options.backend,
+            )?),
+        };
+        let metadata = network.as_ref().map(DescriptorNetwork::metadata);
+        let mut shot = metadata.map_or_else(ShotOptions::default, |m| m.shot);
+        shot.radius = options.shot_radius.unwrap_or(shot.radius);
+        let default_decimate = metadata.map_or(ShapeOptions::default().decimate, |m| m.decimate);
+        let solver = metadata.map_or(FmapSolver::LeastSquares, |m| m.solver.for_matching());
+        let k = options.k.unwrap_or_else(|| metadata.map_or(SHOT_K, |m| m.k));
+        let by_default = if network.is_some() { None } else { Some(Refinement::None) };
+        Ok(Self {
+            shape_options: ShapeOptions {
+                decimate: options.decimate.unwrap_or(default_decimate),
+                whole_area: None,
+            },
+            k,
+            solver: options.solver.unwrap_or(solver),
+            part_solver: FmapSolver::for_part(options.solver),
+            refinement: options.refinement.or(by_default),
+            upscaling: options.upscaling,
+            shot,
+            network: network.map(|network| NetworkDescriptor { network, shot }),
+            cache: options.cache.as_deref().map(Cache::open).transpose()?,
+        })
+    }
+
+    /// How shapes are repaired and decimated.
+    pub fn shape_options(&self) -> &ShapeOptions {
+        &self.shape_options
+    }
+
+    /// Settings of SHOT, where it is computed.
+    pub fn shot_options(&self) -> &ShotOptions {
+        &self.shot
+    }
+
+    /// Number of eigenfunctions of the functional map.
+    pub fn k(&self) -> usize {
+        self.k
+    }
+
+    /// The solver of the functional map of whole shapes, or of a part and its whole.
+    fn solver(&self, is_part: bool) -> FmapSolver {
+        if is_part { self.part_solver } else { self.solver }
+    }
+
+    /// What refines the maps of whole shapes, or of a part and its whole.
+    pub fn refinement(&self, is_part: bool) -> Refinement {
+        self.refinement.unwrap_or_else(|| Refinement::suiting(self.solver(is_part)))
+    }
+
+    /// The model, unless descriptors are SHOT.
+    pub fn network(&self) -> Option<&DescriptorNetwork> {
+        self.network.as_ref().map(|descriptor| &descriptor.network)
+    }
+
+    /// The network with what computes its inputs, unless descriptors are SHOT.
+    pub fn network_descriptor(&self) -> Option<&NetworkDescriptor> {
+        self.network.as_ref()
+    }
+
+    /// What describes shapes.
+    pub fn descriptor(&self) -> &dyn Descriptor {
+        match &self.network {
+            Some(network) => network,
+            None => &self.shot,
+        }
+    }
+
+    /// The matcher's cache, and who is told.
+    pub fn context<'a>(&'a self, observer: Observer<'a>) -> Context<'a> {
+        Context { cache: self.cache.as_ref(), observer }
+    }
+
+    /// Processes a shape and computes its descriptors; `name` is for messages.
+    ///
+    /// # Errors
+    /// If the mesh has no surface left after repair, is too small for `k` eigenfunctions or too large for the memory, if the
+    /// radius is out of range, the network fails, or the cache cannot be written; it names the shape.
+    pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
+        self.describe_by(&self.shape_options, name, mesh, observer)
+    }
+
+    /// As [`Matcher::describe`], for a part of a shape in the unit of the whole: `whole_area` is the area of that, in
+    /// squared units of the mesh, above 0. A part may be the source of a map to the whole, in whatever pose, and is matched
+    /// as a part.
+    ///
+    /// # Errors
+    /// As [`Matcher::describe`], and if `whole_area` is out of range.
+    pub fn describe_part(
+        &self,
+        name: &str,
+        mesh: &Mesh,
+        whole_area: f64,
+        observer: Observer,
+    ) -> Result<DescribedShape, Error> {
+        let options = ShapeOptions { whole_area: Some(whole_area), ..self.shape_options.clone() };
+        self.describe_by(&options, name, mesh, observer)
+    }
+
+    fn describe_by(
+        &self,
+        options: &ShapeOptions,
+        name: &str,
+        mesh: &Mesh,
+        observer: Observer,
+    ) -> Result<DescribedShape, Error> {
+        let context = self.context(observer);
+        let shape = Shape::new(name, mesh, options, context)?;
+        let wanted = self.refinement(options.whole_area.is_some()).eigenpairs(self.k);
+        // Small meshes do not have so many eigenfunctions as refinement would like.
+        let refined_k = wanted.min((shape.n() / 4).max(self.k));
+        // Asked for once at its largest, the eigenbasis serves every smaller one.
+        shape.eigenbasis(refined_k.max(self.descriptor().eigenpairs()), context)?;
+        let descriptors = self.descriptor().describe(&shape, context)?;
+        Ok(DescribedShape { shape, descriptors, refined_k })
+    }
+
+    /// Computes the map of a pair, from the source to the target; that of a part to its whole where the source was
+    /// described as one.
+    ///
+    /// # Errors
+    /// If the descriptors are of different models or not finite, a shape has too few eigenfunctions, a stage would take more
+    /// memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the shape or the pair.
+    pub fn match_shapes(
+        &self,
+        source: &DescribedShape,
+        target: &DescribedShape,
+        observer: Observer,
+    ) -> Result<Match, Error> {
+        let names = format!("{} -> {}", source.shape.name, target.shape.name);
+        let pair = Pair { matcher: self, source, target, names: &names, context: self.context(observer) };
+        pair.run().map_err(|e| e.in_shape(&names))
+    }
+}
+
+/// Matches two meshes with the given options: one pair, everything computed anew.
+///
+/// # Errors
+/// As [`Matcher::new`], [`Matcher::describe`] and [`Matcher::match_shapes`].
+pub fn match_meshes(source: &Mesh, target: &Mesh, options: &MatchOptions) -> Result<Match, Error> {
+    let matcher = Matcher::new(options)?;
+    let observer: Observer = &crate::events::ignore;
+    let source = matcher.describe("source", source, observer)?;
+    let target = matcher.describe("target", target, observer)?;
+    matcher.match_shapes(&source, &target, observer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::events::ignore;
+    use crate::mesh::shapes::bumpy_sphere;
+
+    fn matcher(k: usize) -> Matcher {
+        let (descriptor, k) = (DescriptorKind::Shot, Some(k));
+        Matcher::new(&MatchOptions { descriptor, k, ..MatchOptions::default() }).unwrap()
+    }
+
+    #[test]
+    fn errors_of_a_pair_name_what_they_are_of() {
+        let (mesh, matcher, other) = (bumpy_sphere(2, 1), matcher(20), matcher(10));
+        let good = matcher.describe("good", &mesh, &ignore).unwrap();
+        let few = other.describe("few", &mesh, &ignore).unwrap();
+        matcher.match_shapes(&good, &few, &ignore).unwrap();
+        other.match_shapes(&good, &few, &ignore).unwrap();
+        let mut wrong = good.clone();
+        wrong.descriptors.data_mut()[0] = f32::NAN;
+        let error = matcher.match_shapes(&good, &wrong, &ignore).unwrap_err().to_string();
+        assert!(error.starts_with("good -> good: row "), "{error}");
+        let error = matcher.describe("tiny", &bumpy_sphere(0, 1), &ignore).unwrap_err().to_string();
+        assert!(error.starts_with("tiny: 20 eigenpairs"), "{error}");
+    }
+}

@@ -1,0 +1,110 @@
+//! Settings of a [`Matcher`](super::Matcher).
+
+use crate::fmap::FmapSolver;
+use crate::network::Backend;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Eigenfunctions that refinement goes up to; 500 in the product manifold filter gained nothing.
+const REFINED_K: usize = 200;
+
+/// The pointwise descriptors that the functional map is computed from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum DescriptorKind {
+    /// By the network of a model.
+    #[default]
+    Learned,
+    /// SHOT itself: the paper's baseline.
+    Shot,
+}
+
+/// What happens to the map of the working meshes before it is upscaled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Refinement {
+    /// Nothing: the raw map.
+    None,
+    /// Spectral ICP (Ovsjanikov et al. 2012).
+    Icp,
+    /// ZoomOut (Melzi et al. 2019).
+    #[default]
+    Zoomout,
+    /// The wavelet filter, coarse to fine, in both directions (Hu, Li, Liu et al. 2021); for whole shapes only.
+    Wavelet,
+    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
+    /// meshes of equally many vertices, injective where the source has fewer.
+    #[serde(alias = "pmf-geometry")]
+    #[value(alias = "pmf-geometry")]
+    Pmf,
+    /// The product manifold filter, then along the triangulation, where both meshes turn out to have the same, as
+    /// registrations of one template do: the map then is exact, whatever the shapes.
+    SharedTriangulation,
+}
+
+impl Refinement {
+    /// What suits the maps of a solver: the wavelet filter for those of both directions, ZoomOut for others.
+    pub fn suiting(solver: FmapSolver) -> Self {
+        match solver {
+            FmapSolver::Joint { .. } => Self::Wavelet,
+            _ => Self::Zoomout,
+        }
+    }
+
+    /// Eigenfunctions that it uses of each shape, where the functional map has `k`.
+    pub(super) fn eigenpairs(self, k: usize) -> usize {
+        match self {
+            Self::None | Self::Icp => k,
+            Self::Zoomout | Self::Wavelet | Self::Pmf | Self::SharedTriangulation => k.max(REFINED_K),
+        }
+    }
+}
+
+/// How the map of decimated meshes becomes one of the full meshes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Upscaling {
+    /// The robust l2,1 problem of the paper.
+    #[default]
+    L21,
+    /// Plain least squares, which wrong matches bend.
+    LeastSquares,
+}
+
+/// Which model computes the descriptors.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ModelSource {
+    /// The model built into the library.
+    #[default]
+    Embedded,
+    /// A model file.
+    File(PathBuf),
+}
+
+/// Settings of a [`Matcher`](super::Matcher). What is `None` comes from the model, or without one from the paper.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MatchOptions {
+    /// Learned descriptors, which are the default, or SHOT.
+    pub descriptor: DescriptorKind,
+    /// The model, for learned descriptors. Default: the one that is built in.
+    pub model: ModelSource,
+    /// What computes the network. Default: tract.
+    pub backend: Backend,
+    /// Number of eigenfunctions of the functional map, from 1 to what [`crate::spectral::eigenbasis`] gives of the working meshes. Default:
+    /// the model's; 120 for SHOT.
+    pub k: Option<usize>,
+    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT;
+    /// [`FmapSolver::Part`] for a part and its whole.
+    pub solver: Option<FmapSolver>,
+    /// SHOT radius relative to sqrt(area), above 0. Default: the model's; that of [`crate::descriptor::ShotOptions`] for SHOT.
+    pub shot_radius: Option<f64>,
+    /// Meshes of more vertices are decimated to so many, 4 or more; `Some(None)`: never. Default: the model's; 15000 for
+    /// SHOT.
+    pub decimate: Option<Option<usize>>,
+    /// Refinement. Default: what suits the solver, [`Refinement::suiting`]; none for SHOT.
+    pub refinement: Option<Refinement>,
+    /// Upscaling of the map of decimated meshes. Default: the l2,1 problem.
+    pub upscaling: Upscaling,
+    /// Folder of results kept for each shape; `None`, the default: nothing is kept.
+    pub cache: Option<PathBuf>,
+}

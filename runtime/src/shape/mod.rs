@@ -1,0 +1,224 @@
+//! One shape: the mesh that quantities live on, the way back to the input's vertices, and a store of named quantities.
+//!
+//! [`Shape::new`] repairs and decimates. Everything else is a quantity ([`quantities`]), computed when first asked for: the
+//! Laplacian, the eigenbasis, gradients of the eigenfunctions, the wave kernel signature, SHOT, the eigenbasis at full
+//! resolution. With a [`Cache`] each is kept under (mesh, quantity, its own options, its version), so that another `k` does
+//! not compute SHOT anew, and a model that takes no SHOT never computes it.
+
+pub mod quantities;
+mod way_back;
+
+use crate::cache::{Cache, CacheKey, Decoder, Encoder};
+use crate::error::Error;
+use crate::events::{Observer, timed};
+use crate::mesh::{DecimateOptions, Mesh, RepairOptions, decimate, repair};
+use quantities::Store;
+use serde::{Deserialize, Serialize};
+use std::sync::Mutex;
+
+pub use way_back::WayBack;
+
+/// Settings of [`Shape::new`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapeOptions {
+    /// Meshes of more vertices than this are decimated to it; 4 or more, `None`: never. Default 15000, as in the paper.
+    pub decimate: Option<usize>,
+    /// For a part of a shape: the area of the whole, in squared units of the mesh, above 0. The SHOT radius is then relative
+    /// to it, and so is [`Shape::unit_basis`]. `None`: the shape is whole. Default `None`.
+    pub whole_area: Option<f64>,
+}
+
+impl Default for ShapeOptions {
+    fn default() -> Self {
+        Self { decimate: Some(15_000), whole_area: None }
+    }
+}
+
+impl ShapeOptions {
+    /// Checks what no stage checks.
+    fn check(&self) -> Result<(), Error> {
+        match self.whole_area {
+            Some(area) if !(area > 0.0 && area.is_finite()) => Err(Error::WholeArea { area }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Where results are kept, and who is told of stages and warnings.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    /// The folder of quantities; `None`: nothing is kept on disk.
+    pub cache: Option<&'a Cache>,
+    /// Receives the events.
+    pub observer: Observer<'a>,
+}
+
+impl Context<'_> {
+    /// Nothing is kept and nobody is told.
+    pub const SILENT: Context<'static> = Context { cache: None, observer: &crate::events::ignore };
+}
+
+/// A repaired, possibly decimated shape and what was computed of it so far.
+#[derive(Debug)]
+pub struct Shape {
+    /// Name for messages: the file's name, or what the caller chose.
+    pub name: String,
+    /// The repaired mesh at full resolution, `[n_full]` vertices.
+    pub full_mesh: Mesh,
+    /// The decimated mesh, `[n]` vertices; absent for small meshes.
+    decimated: Option<Mesh>,
+    /// From the vertices of the meshes to the input's and back.
+    pub way_back: WayBack,
+    /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]), in squared units of the mesh.
+    pub whole_area: Option<f64>,
+    key: CacheKey,
+    store: Mutex<Store>,
+}
+
+impl Clone for Shape {
+    fn clone(&self) -> Self {
+        Self {
+            name: self.name.clone(),
+            full_mesh: self.full_mesh.clone(),
+            decimated: self.decimated.clone(),
+            way_back: self.way_back.clone(),
+            whole_area: self.whole_area,
+            key: self.key,
+            store: Mutex::new(self.store().clone()),
+        }
+    }
+}
+
+/// Raise where repair or decimation give another mesh.
+const MESH_VERSION: u32 = 1;
+
+impl Shape {
+    /// Repairs and, where it is larger than the options say, decimates a mesh as read; `name` is for messages.
+    ///
+    /// # Errors
+    /// If repair leaves no face, the area of the whole or the decimation target is out of range, or the cache cannot be
+    /// written; it names the shape.
+    pub fn new(name: &str, mesh: &Mesh, options: &ShapeOptions, context: Context) -> Result<Self, Error> {
+        Self::process(name, mesh, options, context).map_err(|e| e.in_shape(name))
+    }
+
+    fn process(name: &str, mesh: &Mesh, options: &ShapeOptions, context: Context) -> Result<Self, Error> {
+        options.check()?;
+        let key = mesh_key(mesh, options);
+        let found = context.cache.and_then(|cache| cache.fetch("mesh", key, context.observer));
+        if let Some(shape) = found.and_then(|bytes| Self::decode(name, options, key, &bytes)) {
+            return Ok(shape);
+        }
+        let observer = context.observer;
+        let repaired = timed(observer, name, "repair", || repair(mesh, &RepairOptions::default()))?;
+        let mut way_back = WayBack {
+            input_of_full: repaired.input_of_repaired,
+            full_of_input: repaired.repaired_of_input.iter().map(|v| v.unwrap_or(WayBack::NONE)).collect(),
+            full_of_work: None,
+        };
+        let full_mesh = repaired.mesh;
+        let mut decimated = None;
+        if let Some(target) = options.decimate.filter(|&target| full_mesh.n_vertices() > target) {
+            let result = timed(observer, name, "decimate", || {
+                decimate(&full_mesh, target, &DecimateOptions::default())
+            })?;
+            way_back.full_of_work = Some(result.injection);
+            decimated = Some(result.mesh);
+        }
+        let shape = Self::assemble(name, options, key, full_mesh, decimated, way_back);
+        if let Some(cache) = context.cache {
+            cache.put("mesh", key, &shape.encode())?;
+        }
+        Ok(shape)
+    }
+
+    fn assemble(
+        name: &str,
+        options: &ShapeOptions,
+        key: CacheKey,
+        full_mesh: Mesh,
+        decimated: Option<Mesh>,
+        way_back: WayBack,
+    ) -> Self {
+        let (name, whole_area) = (name.to_string(), options.whole_area);
+        Self { name, full_mesh, decimated, way_back, whole_area, key, store: Mutex::default() }
+    }
+
+    /// The key of the processed mesh: the input's content, the options and their version. Quantities derive theirs from it.
+    pub fn key(&self) -> CacheKey {
+        self.key
+    }
+
+    /// The mesh that quantities live on: the decimated one, or the full one.
+    pub fn mesh(&self) -> &Mesh {
+        self.decimated.as_ref().unwrap_or(&self.full_mesh)
+    }
+
+    /// Whether [`Shape::mesh`] is decimated.
+    pub fn is_decimated(&self) -> bool {
+        self.decimated.is_some()
+    }
+
+    /// Number of vertices `n` of [`Shape::mesh`].
+    pub fn n(&self) -> usize {
+        self.mesh().n_vertices()
+    }
+
+    /// Number of vertices of the input mesh.
+    pub fn n_input(&self) -> usize {
+        self.way_back.full_of_input.len()
+    }
+
+    /// The area that counts as 1: that of the mesh, or of the whole that it is a part of.
+    pub fn unit_area(&self) -> f64 {
+        self.whole_area.unwrap_or_else(|| self.mesh().area())
+    }
+
+    fn encode(&self) -> Vec<u8> {
+        let mut out = Encoder::default();
+        encode_mesh(&mut out, &self.full_mesh);
+        out.slice(&self.way_back.input_of_full).slice(&self.way_back.full_of_input);
+        let decimated = self.decimated.as_ref().zip(self.way_back.full_of_work.as_ref());
+        out.value(u8::from(decimated.is_some()));
+        if let Some((mesh, injection)) = decimated {
+            encode_mesh(&mut out, mesh);
+            out.slice(injection);
+        }
+        out.finish()
+    }
+
+    fn decode(name: &str, options: &ShapeOptions, key: CacheKey, bytes: &[u8]) -> Option<Self> {
+        let mut input = Decoder::new(bytes);
+        let full_mesh = decode_mesh(&mut input)?;
+        let (input_of_full, full_of_input) = (input.slice()?, input.slice()?);
+        let (mut decimated, mut full_of_work) = (None, None);
+        if input.value::<u8>()? != 0 {
+            decimated = Some(decode_mesh(&mut input)?);
+            full_of_work = Some(input.slice()?);
+        }
+        let way_back = WayBack { input_of_full, full_of_input, full_of_work };
+        let fits = way_back.fits(&full_mesh, decimated.as_ref());
+        fits.then(|| Self::assemble(name, options, key, full_mesh, decimated, way_back))
+    }
+}
+
+fn mesh_key(mesh: &Mesh, options: &ShapeOptions) -> CacheKey {
+    let options = serde_json::to_vec(options).unwrap_or_default();
+    CacheKey::of(&[
+        bytemuck::cast_slice(mesh.vertices()),
+        bytemuck::cast_slice(mesh.faces()),
+        &options,
+        &MESH_VERSION.to_le_bytes(),
+    ])
+}
+
+fn encode_mesh(out: &mut Encoder, mesh: &Mesh) {
+    out.slice(mesh.vertices()).slice(mesh.faces());
+}
+
+fn decode_mesh(input: &mut Decoder) -> Option<Mesh> {
+    Mesh::new(input.slice()?, input.slice()?).ok()
+}
+
+#[cfg(test)]
+mod tests;
