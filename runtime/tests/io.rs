@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use fmnet::io::{
-    Attributes, MeshFormat, Texture, read_matrix, read_mesh, read_point_map, read_vector, write_matrix,
-    write_mesh, write_point_map, write_vector,
+    Attributes, IntegerField, IntegerKind, MeshFormat, read_matrix, read_mesh, read_point_map, read_vector,
+    write_matrix, write_mesh, write_point_map, write_vector,
 };
 use fmnet::point_map::PointMap;
 use fmnet::{Matrix, Mesh};
@@ -108,18 +108,30 @@ fn textured_mesh() -> impl Strategy<Value = (Mesh, Attributes)> {
         let uv = || [0..=16u8, 0..=16u8].prop_map(|uv| uv.map(|x| f32::from(x) / 16.0));
         let colors = proptest::option::of(vec(any::<[u8; 4]>(), n));
         let uvs = proptest::option::of(vec([uv(), uv(), uv()], m));
-        let scalars = vec(vec(proptest::num::f32::NORMAL, n), 0..3);
-        (Just(mesh), colors, uvs, scalars).prop_map(|(mesh, vertex_colors, corner_uvs, fields)| {
-            let texture = corner_uvs.as_ref().map(|_| Texture::File("/images/skin.png".into()));
-            let vertex_scalars = fields.into_iter().enumerate().map(|(i, f)| (format!("f{i}"), f)).collect();
-            (mesh, Attributes { vertex_colors, corner_uvs, texture, vertex_scalars, skin: None })
-        })
+        let scalars = vec(vec(proptest::num::f32::NORMAL.prop_map(f64::from), n), 0..3);
+        let integers = proptest::option::of(vec(any::<i16>().prop_map(i64::from), n));
+        (Just(mesh), colors, uvs, scalars, integers).prop_map(
+            |(mesh, vertex_colors, corner_uvs, fields, labels)| {
+                let vertex_scalars =
+                    fields.into_iter().enumerate().map(|(i, f)| (format!("f{i}"), f)).collect();
+                let field = |values| IntegerField { name: "label".into(), kind: IntegerKind::I32, values };
+                let vertex_integers = labels.into_iter().map(field).collect();
+                let attributes = Attributes {
+                    vertex_colors,
+                    corner_uvs,
+                    vertex_scalars,
+                    vertex_integers,
+                    ..Attributes::default()
+                };
+                (mesh, attributes)
+            },
+        )
     })
 }
 
-/// Whether colours of a text format are told from those that count to 1: one component must exceed 1.
-fn is_clear(colors: &[[u8; 4]], n_components: usize) -> bool {
-    colors.iter().any(|c| c[..n_components].iter().any(|&x| x > 1))
+/// Whether colours of a text format are told from those that count to 1: an alpha must exceed 1.
+fn is_clear(colors: &[[u8; 4]]) -> bool {
+    colors.iter().any(|c| c[3] > 1)
 }
 
 proptest! {
@@ -132,7 +144,7 @@ proptest! {
         write_mesh(&path, &mesh, &attributes).unwrap();
         let file = read_mesh(&path).unwrap();
         prop_assert_eq!(file.mesh, mesh);
-        if attributes.vertex_colors.as_ref().is_none_or(|colors| is_clear(colors, 4)) {
+        if attributes.vertex_colors.as_ref().is_none_or(|colors| is_clear(colors)) {
             prop_assert_eq!(file.attributes.vertex_colors, attributes.vertex_colors);
         }
     }
@@ -155,7 +167,6 @@ proptest! {
         let file = read_mesh(&path).unwrap();
         prop_assert_eq!(file.mesh, mesh);
         prop_assert_eq!(file.attributes.corner_uvs, attributes.corner_uvs);
-        prop_assert_eq!(file.attributes.texture, attributes.texture);
         let opaque = attributes.vertex_colors.map(|c| c.iter().map(|c| [c[0], c[1], c[2], 255]).collect::<Vec<_>>());
         prop_assert_eq!(file.attributes.vertex_colors, opaque);
     }
@@ -174,11 +185,14 @@ proptest! {
             prop_assert_eq!(file.mesh.corners(face), mesh.corners(face));
         }
         prop_assert_eq!(file.attributes.corner_uvs, attributes.corner_uvs);
-        prop_assert_eq!(file.attributes.texture, attributes.texture);
         let colors = file.attributes.vertex_colors.map(|colors| colors[..n].to_vec());
         prop_assert_eq!(colors, attributes.vertex_colors);
         for (found, expected) in file.attributes.vertex_scalars.iter().zip(&attributes.vertex_scalars) {
             prop_assert_eq!((&found.0, &found.1[..n]), (&expected.0, &expected.1[..]));
+        }
+        prop_assert_eq!(file.attributes.vertex_integers.len(), attributes.vertex_integers.len());
+        for (found, expected) in file.attributes.vertex_integers.iter().zip(&attributes.vertex_integers) {
+            prop_assert_eq!((&found.name, &found.values[..n]), (&expected.name, &expected.values[..]));
         }
     }
 

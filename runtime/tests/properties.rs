@@ -125,6 +125,7 @@ proptest! {
                 corner_uvs: Some(vec![[[0.25, 0.5]; 3]; giver.n_faces()]),
                 texture: None,
                 vertex_scalars: vec![("f".into(), vec![3.0; n])],
+                vertex_integers: Vec::new(),
                 skin: Some(Skin {
                     joints: (0..3).map(joint).collect(),
                     indices: vec![[2, 0, 1, 0]; n],

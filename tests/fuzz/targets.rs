@@ -6,8 +6,9 @@ use fmnet::cache::{Cache, Lookup};
 use fmnet::descriptor::ShotOptions;
 use fmnet::events::ignore;
 use fmnet::io::{
-    Attributes, Joint, Skin, Texture, decode_mesh, read_matrix, read_point_map, read_surface_points,
-    read_vector, write_matrix, write_mesh, write_point_map, write_surface_points,
+    Attributes, IntegerField, IntegerKind, Joint, NpyArray, NpyKind, Skin, Texture, decode_mesh, read_matrix,
+    read_npy, read_point_map, read_surface_points, read_vector, write_matrix, write_mesh, write_npy,
+    write_point_map, write_surface_points,
 };
 use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
 use fmnet::mesh::{SurfacePoint, inspect};
@@ -118,6 +119,11 @@ fn decorated() -> (Mesh, Attributes) {
         corner_uvs: Some(vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0.5, 0.5], [1.0, 0.0], [0.5, 0.25]]]),
         texture: Some(Texture::Embedded { bytes: vec![0x89, b'P', b'N', b'G'], mime: "image/png".into() }),
         vertex_scalars: vec![("f".into(), vec![0.0, 1.0, 2.0, 3.0])],
+        vertex_integers: vec![IntegerField {
+            name: "label".into(),
+            kind: IntegerKind::I16,
+            values: vec![-7, 0, 300, 12345],
+        }],
         skin: Some(Skin {
             joints: vec![joint(None), joint(Some(0))],
             indices: vec![[0, 1, 0, 0]; 4],
@@ -144,9 +150,15 @@ fn seeds_of(extension: &str, folder: &Path) -> Vec<Vec<u8>> {
 fn variants(extension: &str) -> Vec<Vec<u8>> {
     let text = |text: &str| text.as_bytes().to_vec();
     match extension {
-        "off" => vec![text(
-            "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 0 1 0 1 1 0\n0 1 0 0 0 1 0 0 1 1 0 1\n3 0 1 2\n",
-        )],
+        "off" => vec![
+            text(
+                "STCNOFF\n3 1 0\n0 0 0 0 0 1 1 0 0 1 0 0\n1 0 0 0 0 1 0 1 0 1 1 0\n0 1 0 0 0 1 0 0 1 1 0 1\n3 0 1 2\n",
+            ),
+            text(
+                "OFF # by hand\n4 3 0\n0 0 0\n1 0 0\n1.5D0 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 0 0 1 1\n3 0 1 3 7\n",
+            ),
+            utf16("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        ],
         "ply" => vec![
             big_endian_ply(),
             text(
@@ -155,19 +167,37 @@ fn variants(extension: &str) -> Vec<Vec<u8>> {
              element face 1\nproperty list uint8 int32 vertex_index\nproperty list uchar float texcoord\nend_header\n\
              0 0 0 0\n1 2 3 2 4 5\n7 1 0 1 2\n4 0 1 2 -1\n3 0 1 2 6 0 0 1 0 0 1\n",
             ),
+            text(
+                "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 3\nproperty float x\n\
+             property float y\nproperty float z\nproperty short red\nproperty short green\nproperty short blue\nproperty int label\n\
+             element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\n\
+             property float red\nproperty float green\nproperty float blue\nelement edge 1\nproperty int a\nend_header\n\
+             0 0 0 1 2 3 7\n1 0 0 4 5 6 8\n0 1 0 0 0 0 -9\n3 0 1 2 6 0 0 1 0 0 1 1 0.5 1 0\n5\n",
+            ),
         ],
-        "obj" => vec![text(
-            "o a\nv 0 0 0\nv 1 0 0 1 0 1\nv 1 1 0\nv 0 1 0\nvt 0 1\nvn 0 0 1\nf -1/-1/1 -2/1 1//1 \\\n2\nusemtl a\nf 1 2 3 4\n",
-        )],
+        "obj" => vec![
+            text(
+                "#MRGB ff112233ff445566ff778899\nmtllib a.mtl \"b c.mtl\"\ng arm #1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0\nusemtl skin #1\n\
+                 f 1 2 3\nl 1 2\ncurv 0 1 1 2\n",
+            ),
+            text(
+                "o a\nv 0 0 0\nv 1 0 0 1 0 1\nv 1 1 0\nv 0 1 0\nvt 0 1\nvn 0 0 1\nf -1/-1/1 -2/1 1//1 \\\n2\nusemtl a\nf 1 2 3 4\n",
+            ),
+        ],
         "stl" => {
             let mut binary = vec![b' '; 80];
             binary.extend([2, 0, 0, 0]);
             binary.extend([0; 100]);
             let ascii = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
-            vec![binary, text(ascii)]
+            let mut uncounted = binary.clone();
+            uncounted[80] = 0;
+            uncounted.extend(b"made by a scanner");
+            vec![binary, text(ascii), uncounted, utf16(&ascii.replace("end", "END "))]
         }
-        "gltf" => vec![text(
-            r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "gltf" => vec![
+            text(INSTANCES),
+            text(
+                r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
             "nodes": [{"children": [1], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1]}, {"mesh": 0, "skin": 0, "matrix":
             [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}], "skins": [{"joints": [0, 1]}],
             "buffers": [{"byteLength": 12, "uri": "data:;base64,AAAAAAAAAAAAAAAA"}],
@@ -179,9 +209,36 @@ fn variants(extension: &str) -> Vec<Vec<u8>> {
             "images": [{"uri": "a.png"}], "textures": [{"source": 0}],
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5, "material": 0, "indices": 1}]}]}"#,
-        )],
+            ),
+        ],
         _ => Vec::new(),
     }
+}
+
+/// Morph targets, instances, two sets of joints, a placed texture, a material of another model.
+const INSTANCES: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}, {"nodes": [2]}],
+    "extensionsUsed": ["EXT_mesh_gpu_instancing", "KHR_texture_transform", "MADE_up"],
+    "nodes": [{"mesh": 0, "skin": 0, "weights": [0.5], "extensions": {"EXT_mesh_gpu_instancing": {"attributes":
+    {"TRANSLATION": 0, "ROTATION": 2, "SCALE": 0}}}}, {"name": "joint"}, {"mesh": 0, "name": "hidden"}],
+    "skins": [{"joints": [1]}],
+    "buffers": [{"byteLength": 24, "uri": "data:;base64,AAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAA"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 24}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 2},
+    {"bufferView": 0, "componentType": 5123, "type": "VEC2", "count": 2, "byteOffset": 4},
+    {"bufferView": 0, "componentType": 5122, "normalized": true, "type": "VEC4", "count": 2},
+    {"bufferView": 0, "componentType": 5121, "type": "VEC4", "count": 2, "byteOffset": 12},
+    {"bufferView": 0, "componentType": 5121, "type": "SCALAR", "count": 2}],
+    "textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}], "images": [{"bufferView": 0, "mimeType": "image/webp"}],
+    "materials": [{"name": "m", "normalTexture": {"index": 0}, "pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 0, 1]},
+    "extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [1, 0, 1, 1], "diffuseTexture": {"index": 0,
+    "extensions": {"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 1, "scale": [2, 2], "texCoord": 0}}}}}}],
+    "meshes": [{"weights": [1], "primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 1, "JOINTS_0": 3,
+    "WEIGHTS_0": 3, "JOINTS_1": 3, "WEIGHTS_1": 3, "_LABEL": 4, "_PAIR": 1, "COLOR_0": 0}, "mode": 5, "material": 0,
+    "targets": [{"POSITION": 0}]}]}], "animations": [], "cameras": []}"#;
+
+/// As UTF-16 with a byte-order mark.
+fn utf16(text: &str) -> Vec<u8> {
+    [0xFEFF].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
 }
 
 fn big_endian_ply() -> Vec<u8> {
@@ -215,7 +272,7 @@ fn meshes(extension: &str, folder: &Path) -> Target {
 
 fn materials(folder: &Path) -> Target {
     let (library, mesh) = (folder.join("a.mtl"), folder.join("a.obj"));
-    let seed = "# two\nnewmtl a\nKa 1 1 1\nKd 0.5 0.5 0.5\nNs 10\nd 1\nTr 0\nillum 2\nmap_Kd -s 1 1 1 skin.png\nnewmtl b\nmap_Kd b.jpg\n";
+    let seed = "# two\nnewmtl a\nKa 1 1 1\nKd 0.5 0.5 0.5\nNs 10\nd 1\nTr 0\nillum 2\nmap_Kd -s 1 1 1 skin.png\nmap_Bump -bm 1 C:\\n.png\nnewmtl b\nKd 1 0 0\nmap_Kd b.jpg # no\n";
     let text = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 2/1 3/1\n";
     Target::new(vec![seed.into()], move |bytes| {
         std::fs::write(&library, bytes).unwrap();
@@ -248,7 +305,10 @@ fn maps(name: &str, folder: &Path) -> Target {
     let path = folder.join(name);
     let (targets, confidence) = (vec![1, 0, PointMap::UNMATCHED], Some(vec![0.5, 1.0, 0.0]));
     write_point_map(&path, &PointMap { targets, confidence, n_target: 2 }).unwrap();
-    Target::new(vec![std::fs::read(&path).unwrap()], move |bytes| {
+    let bytes = std::fs::read(&path).unwrap();
+    let wide: Vec<u8> = [&[0xFF, 0xFE][..], &bytes.iter().flat_map(|&b| [b, 0]).collect::<Vec<_>>()].concat();
+    let seeds = if name == "map.npy" { vec![bytes] } else { vec![bytes, wide] };
+    Target::new(seeds, move |bytes| {
         std::fs::write(&path, bytes).unwrap();
         read_point_map(&path, None).is_ok() | read_point_map(&path, Some(2)).is_ok()
     })
@@ -259,8 +319,14 @@ fn matrices(folder: &Path) -> Target {
     write_matrix(&path, &Matrix::from_vec(2, 2, vec![0.0, 1.0, 2.0, 3.0])).unwrap();
     let doubles = std::fs::read(&path).unwrap();
     write_matrix(&path, &Matrix::from_vec(1, 4, vec![0.0f32; 4])).unwrap();
-    Target::new(vec![doubles, std::fs::read(&path).unwrap()], move |bytes| {
+    let singles = std::fs::read(&path).unwrap();
+    let labels = NpyArray::Integers(Matrix::from_vec(2, 2, vec![0, 1, 200, 255]), NpyKind::U1);
+    write_npy(&path, &labels).unwrap();
+    Target::new(vec![doubles, singles, std::fs::read(&path).unwrap()], move |bytes| {
         std::fs::write(&path, bytes).unwrap();
+        if let Ok(array) = read_npy(&path) {
+            write_npy(&path.with_extension("out"), &array).unwrap();
+        }
         let matrix = read_matrix::<f64>(&path).is_ok() | read_matrix::<f32>(&path).is_ok();
         matrix | read_vector::<f64>(&path).is_ok() | read_vector::<i32>(&path).is_ok()
     })

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Share of matches whose error is at most a threshold, for rising thresholds.
 ///
-/// The share at 0 is that of exact matches, as in the paper's figures. Unmatched (NaN) and disconnected (infinite)
-/// matches count in the denominator and lie beyond every threshold.
+/// The share at 0 is that of exact matches, as in the paper's figures. Unmatched vertices (NaN) count in the denominator and lie
+/// beyond every threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorCurve {
     /// Normalised errors, ascending.

@@ -7,9 +7,10 @@ use crate::point_map::PointMap;
 /// Normalised geodesic error `d_Y(y, y*) / sqrt(area(Y))` of each correct match `(x, y*)` of the ground truth, in its
 /// order, where the map sends `x` to `y`.
 ///
-/// `solver` and `area`, in squared units, belong to the target mesh. The error is NaN where the map leaves `x` unmatched
-/// and infinite where `y` and `y*` are on different components; [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say
-/// how they count these.
+/// `solver` and `area`, in squared units, belong to the target mesh. The error is NaN where the map leaves `x` unmatched;
+/// [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say how they count these. Vertices at one place are one vertex, so a match on a
+/// duplicate of the right vertex is exact. Where `y` and `y*` are on different components, no path leads from one to the other, and the
+/// straight line through space counts.
 ///
 /// # Errors
 /// If the map, the ground truth and the solver are not for the same meshes, or the map names a vertex that does not exist.
@@ -63,7 +64,8 @@ pub fn symmetric_geodesic_errors(
     let direct = geodesic_errors(map, ground_truth, solver, area)?;
     let flipped = geodesic_errors(map, mirrored, solver, area)?;
     let mean = |errors: &[f32]| ErrorSummary::new(errors, area).mean;
-    let is_mirrored = mean(&flipped) < mean(&direct);
+    // Without any match the mean is NaN, which is no better than a number.
+    let is_mirrored = mean(&flipped).total_cmp(&mean(&direct)).is_lt();
     Ok(SymmetricErrors { errors: if is_mirrored { flipped } else { direct }, is_mirrored })
 }
 
@@ -91,8 +93,22 @@ mod tests {
         let errors = geodesic_errors(&map, &truth, &solver, area).unwrap();
         assert_eq!(errors[..2], [0.0, 1.0]);
         assert!((f64::from(errors[2]) - 5f64.sqrt() / 2.0).abs() < 1e-6);
-        assert!(errors[3].is_nan() && errors[4].is_infinite());
+        // Vertex 6 is on the triangle apart, 9 from vertex 0 through space.
+        assert!(errors[3].is_nan() && errors[4] == 4.5);
         assert_eq!(errors[5], 0.0);
+    }
+
+    /// The same square twice, as two meshes in one file, and as triangles that share no vertex.
+    #[test]
+    fn duplicates_of_a_vertex_are_that_vertex() {
+        let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let soup = [0, 1, 2, 0, 2, 3].map(|v: usize| square[v]).to_vec();
+        let mesh = Mesh::new(soup, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+        let solver = GeodesicSolver::new(&mesh, &GeodesicOptions::default());
+        let map = PointMap::new(vec![3, 1, 4, 0, 2, 1], 6);
+        let errors = geodesic_errors(&map, &GroundTruth::identity(6), &solver, 1.0).unwrap();
+        assert_eq!(errors[..5], [0.0; 5]);
+        assert!((errors[5] - 2f32.sqrt()).abs() < 1e-6, "through both triangles: {}", errors[5]);
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Which matches are right.
 
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::EvalError;
-use crate::io::read_point_map;
+use crate::io::{path_from_bytes, read_point_map};
 use crate::point_map::PointMap;
 
 /// Correct matches between a source and a target, as pairs of 0-based vertices.
@@ -53,6 +54,27 @@ impl FromStr for GroundTruthSource {
 }
 
 impl GroundTruthSource {
+    /// As [`str::parse`], of a text that may hold names of files which are no Unicode. A file that is called so is a map, whatever commas
+    /// are in its name.
+    ///
+    /// # Errors
+    /// As [`str::parse`].
+    pub fn from_os_str(text: &OsStr) -> Result<Self, EvalError> {
+        if Path::new(text).is_file() {
+            return Ok(Self::Map(text.into()));
+        }
+        if let Some(text) = text.to_str() {
+            return text.parse();
+        }
+        let parts: Vec<PathBuf> =
+            text.as_encoded_bytes().split(|&b| b == b',').map(path_from_bytes).collect();
+        match <[PathBuf; 2]>::try_from(parts) {
+            Ok([source, target]) => Ok(Self::Lists(source, target)),
+            Err(parts) if parts.len() == 1 => Ok(Self::Map(text.into())),
+            Err(_) => Err(EvalError::BadGroundTruth(text.to_string_lossy().into_owned())),
+        }
+    }
+
     /// The correct matches between meshes of `n_source` and `n_target` vertices.
     ///
     /// # Errors

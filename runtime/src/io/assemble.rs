@@ -16,7 +16,7 @@ pub(super) struct MeshBuilder {
 
 impl MeshBuilder {
     pub(super) fn new(format: MeshFormat) -> Self {
-        let info = ReadInfo { format, n_polygons: 0, n_ignored_faces: 0, warnings: Vec::new() };
+        let info = ReadInfo::new(format);
         Self {
             vertices: Vec::new(),
             faces: Vec::new(),
@@ -59,6 +59,36 @@ impl MeshBuilder {
         self.corner_uvs = self.faces.iter().map(|face| [uv(&face[0]), uv(&face[1]), uv(&face[2])]).collect();
     }
 
+    /// Gives each vertex the mean colour of the faces around it, white where none has one; what the colours are of is noted. Colours
+    /// that the vertices have already stay.
+    pub(super) fn spread_face_colors(&mut self, of_face: &[Option<[u8; 4]>], what: &str) {
+        if of_face.iter().all(Option::is_none) {
+            return;
+        }
+        if self.attributes.vertex_colors.is_some() {
+            self.info.left_out.push(format!("the colours of the {what}, since the vertices have their own"));
+            return;
+        }
+        let mut sums = vec![([0u32; 4], 0u32); self.vertices.len()];
+        for (face, color) in self.faces.iter().zip(of_face) {
+            let Some(color) = color else { continue };
+            for &v in face {
+                if let Some((sum, count)) = sums.get_mut(v as usize) {
+                    sum.iter_mut().zip(color).for_each(|(s, &c)| *s += u32::from(c));
+                    *count += 1;
+                }
+            }
+        }
+        let mean = |&(sum, count): &([u32; 4], u32)| match count {
+            0 => [255; 4],
+            _ => sum.map(|s| ((s + count / 2) / count) as u8),
+        };
+        self.attributes.vertex_colors = Some(sums.iter().map(mean).collect());
+        self.info
+            .left_out
+            .push(format!("the borders of the colours of the {what}, which became colours of the vertices"));
+    }
+
     pub(super) fn finish(mut self) -> Parsed<MeshFile> {
         if !self.corner_uvs.is_empty() {
             self.fill_uvs();
@@ -87,16 +117,32 @@ pub(super) fn strip_triangles(strip: &[i64]) -> impl Iterator<Item = [i64; 3]> {
 
 /// Colours given as numbers, three or four components each, to bytes.
 ///
-/// Text formats do not say whether 1 is full or nearly black: where no component of the whole file exceeds 1, it is full.
+/// Most formats do not say which number is full: 1 where no component of the whole file exceeds 1, else 255, else 65535. An alpha may have
+/// a range of its own, since some programs write a 1 behind bytes.
 pub(super) fn colors_to_bytes(colors: &[[f32; 4]], alpha: bool) -> Vec<[u8; 4]> {
-    let n_components = if alpha { 4 } else { 3 };
-    let unit = colors.iter().all(|c| c[..n_components].iter().all(|&x| x <= 1.0));
-    let scale = if unit { 255.0 } else { 1.0 };
-    let byte = |x: f32| (x * scale).round() as u8;
-    colors
-        .iter()
-        .map(|c| [byte(c[0]), byte(c[1]), byte(c[2]), if alpha { byte(c[3]) } else { 255 }])
-        .collect()
+    let largest = |range: std::ops::Range<usize>| {
+        colors.iter().flat_map(|c| &c[range.clone()]).copied().filter(|x| x.is_finite()).fold(0.0, f32::max)
+    };
+    let alpha_largest = if alpha { largest(3..4) } else { 0.0 };
+    let of_color = full(largest(0..3).max(alpha_largest));
+    // Bytes of nothing but zeros and ones would be all but transparent.
+    let of_alpha = if alpha_largest <= 1.0 { 1.0 } else { of_color };
+    let byte = |x: f32, full: f32| (x / full * 255.0).round() as u8;
+    let convert = |c: &[f32; 4]| {
+        let a = if alpha { byte(c[3], of_alpha) } else { 255 };
+        [byte(c[0], of_color), byte(c[1], of_color), byte(c[2], of_color), a]
+    };
+    colors.iter().map(convert).collect()
+}
+
+/// The number that stands for a full component, where the largest is this.
+fn full(largest: f32) -> f32 {
+    match largest {
+        // Rounding may have made it a little more than 1.
+        x if x <= 1.01 => 1.0,
+        x if x <= 255.0 => 255.0,
+        _ => 65535.0,
+    }
 }
 
 #[cfg(test)]
@@ -127,6 +173,24 @@ mod tests {
     #[test]
     fn colors_of_either_range() {
         assert_eq!(colors_to_bytes(&[[1.0, 0.5, 0.0, 0.0]], false), [[255, 128, 0, 255]]);
-        assert_eq!(colors_to_bytes(&[[1.0, 200.0, 300.0, 255.0]], true), [[1, 200, 255, 255]]);
+        assert_eq!(colors_to_bytes(&[[1.0, 200.0, 255.0, 128.0]], true), [[1, 200, 255, 128]]);
+        assert_eq!(colors_to_bytes(&[[0.0, 32768.0, 65535.0, 0.0]], false), [[0, 128, 255, 255]]);
+        assert_eq!(colors_to_bytes(&[[1.0, 200.0, 255.0, 1.0]], true), [[1, 200, 255, 255]]);
+        assert_eq!(colors_to_bytes(&[[-1.0, f32::NAN, 1.0, 0.5]], true), [[0, 0, 255, 128]]);
+        assert_eq!(colors_to_bytes(&[[1.0, 0.0, 1.0, 255.0]], true), [[1, 0, 1, 255]]);
+    }
+
+    #[test]
+    fn colors_of_faces_are_averaged_at_the_vertices() {
+        let mut builder = MeshBuilder::new(MeshFormat::Off);
+        builder.vertices = vec![[0.0; 3]; 5];
+        builder.polygon(&[0, 1, 2]);
+        builder.polygon(&[1, 2, 3]);
+        builder.spread_face_colors(&[Some([255, 0, 0, 255]), Some([0, 0, 101, 255])], "faces");
+        let file = builder.finish().unwrap();
+        let both = [128, 0, 51, 255];
+        let expected = [[255, 0, 0, 255], both, both, [0, 0, 101, 255], [255; 4]];
+        assert_eq!(file.attributes.vertex_colors.unwrap(), expected);
+        assert!(file.info.left_out[0].contains("colours of the faces"));
     }
 }

@@ -25,29 +25,104 @@ pub struct ReadInfo {
     pub n_polygons: usize,
     /// Faces of fewer than three corners (points, edges), which were left out.
     pub n_ignored_faces: usize,
-    /// What the file holds that was not kept, in sentences for the user.
+    /// What changes the geometry: places of the file that were understood in a way that may not be meant, or left out. In sentences for
+    /// the user of any command.
     pub warnings: Vec<String>,
+    /// What the file carries besides the geometry that was not kept, each as a noun: for who wants to carry attributes over.
+    pub left_out: Vec<String>,
+    /// Names of groups and objects with faces in them, in the order of the file. They are not kept.
+    pub groups: Vec<String>,
+    /// The further files that belong to this one: material libraries, images, buffers.
+    pub files: Vec<PathBuf>,
+}
+
+impl ReadInfo {
+    pub(super) fn new(format: MeshFormat) -> Self {
+        Self {
+            format,
+            n_polygons: 0,
+            n_ignored_faces: 0,
+            warnings: Vec::new(),
+            left_out: Vec::new(),
+            groups: Vec::new(),
+            files: Vec::new(),
+        }
+    }
 }
 
 /// Attributes of a mesh of `n` vertices and `m` triangles. Empty by default.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Attributes {
-    /// Colours, `[n]`: red, green, blue, alpha (255 is opaque).
+    /// Colours, `[n]`: red, green, blue, alpha (255 is opaque), in sRGB as images are.
     pub vertex_colors: Option<Vec<[u8; 4]>>,
     /// Texture coordinates (u, v) of each triangle's three corners, `[m, 3, 2]`; `(0, 0)` is the image's lower left.
     pub corner_uvs: Option<Vec<[[f32; 2]; 3]>>,
     /// The image that `corner_uvs` refers to; it is not written without these.
     pub texture: Option<Texture>,
     /// Named scalar fields, each `[n]`.
-    pub vertex_scalars: Vec<(String, Vec<f32>)>,
+    pub vertex_scalars: Vec<(String, Vec<f64>)>,
+    /// Named fields of integers: labels, identities, which have no values in between.
+    pub vertex_integers: Vec<IntegerField>,
     /// Skin weights.
     pub skin: Option<Skin>,
+}
+
+/// A field of integers, `[n]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntegerField {
+    /// Its name.
+    pub name: String,
+    /// The type that it has in files.
+    pub kind: IntegerKind,
+    /// The values, each in the range of the type.
+    pub values: Vec<i64>,
+}
+
+/// A type of integers in files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum IntegerKind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+}
+
+impl IntegerKind {
+    /// The smallest and the largest number.
+    pub fn range(self) -> (i64, i64) {
+        match self {
+            Self::I8 => (i8::MIN.into(), i8::MAX.into()),
+            Self::U8 => (0, u8::MAX.into()),
+            Self::I16 => (i16::MIN.into(), i16::MAX.into()),
+            Self::U16 => (0, u16::MAX.into()),
+            Self::I32 => (i32::MIN.into(), i32::MAX.into()),
+            Self::U32 => (0, u32::MAX.into()),
+        }
+    }
+
+    /// What stands for no value: -1, or without a sign 0.
+    pub fn missing(self) -> i64 {
+        self.range().0.max(-1)
+    }
+
+    /// The bytes of a number of this type, the least significant first.
+    pub(super) fn put(self, value: i64, bytes: &mut Vec<u8>) {
+        let n = match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 => 4,
+        };
+        bytes.extend(&value.to_le_bytes()[..n]);
+    }
 }
 
 /// A colour image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texture {
-    /// A file, which need not exist.
+    /// A file. One that does not exist is not referred to by any writer.
     File(PathBuf),
     /// An encoded image that came inside the mesh file.
     Embedded {
@@ -102,6 +177,10 @@ impl Attributes {
             .vertex_scalars
             .iter()
             .map(move |(name, values)| (format!("values of '{name}'"), values.len(), n));
+        let integers = self
+            .vertex_integers
+            .iter()
+            .map(move |field| (format!("values of '{}'", field.name), field.values.len(), n));
         let skin = self.skin.iter().flat_map(move |skin| {
             [
                 ("joint indices".to_owned(), skin.indices.len(), n),
@@ -111,7 +190,7 @@ impl Attributes {
         let colors = self.vertex_colors.iter().map(move |c| ("vertex colours".to_owned(), c.len(), n));
         let uvs =
             self.corner_uvs.iter().map(move |c| ("faces with texture coordinates".to_owned(), c.len(), m));
-        colors.chain(uvs).chain(scalars).chain(skin)
+        colors.chain(uvs).chain(scalars).chain(integers).chain(skin)
     }
 }
 

@@ -83,7 +83,7 @@ impl fmt::Display for Position {
 /// The remedy where a file ends too early.
 pub(super) const TRUNCATED: &str = "the file is truncated: copy or download it again";
 /// The remedy where a file breaks its format's rules.
-pub(super) const REEXPORT: &str = "repair this place or export the mesh again";
+pub(super) const REEXPORT: &str = "repair this place or export the file again";
 
 /// A malformed place, before the file's name is known.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! NumPy's `.npy`: matrices `[rows, cols]` and vectors `[n]` of floats and integers.
 //!
-//! Format: NumPy Enhancement Proposal 1, versions 1.0 to 3.0. Read are `f4`, `f8`, `i4`, `i8` of either byte order, in C
+//! Format: NumPy Enhancement Proposal 1, versions 1.0 to 3.0. Read are `f4`, `f8`, `bool` and integers of 1 to 8 bytes of either byte order, in C
 //! and Fortran order; written is C order, little-endian. The header is parsed here, since it may be hostile.
 
 mod header;
@@ -10,13 +10,14 @@ use std::path::Path;
 use super::error::{ParseError, Parsed, Position, TRUNCATED};
 use super::{IoError, write_atomically};
 use crate::Matrix;
-use header::{Header, Kind};
+use header::Header;
+pub use header::NpyKind;
 
 /// A number that `.npy` files can be read to and written from: `f64`, `f32`, `i32` or `i64`.
 pub trait NpyNumber: Copy + sealed::Sealed {}
 
 mod sealed {
-    use super::header::Kind;
+    use super::NpyKind;
 
     pub trait Sealed: Sized {
         /// NumPy's name of the type.
@@ -35,14 +36,23 @@ mod sealed {
 
     impl Value {
         /// Takes the bytes of one item, least significant first.
-        pub(in super::super) fn from_le_bytes(kind: Kind, bytes: [u8; 8]) -> Self {
+        pub(in super::super) fn from_le_bytes(kind: NpyKind, bytes: [u8; 8]) -> Self {
             let [a, b, c, d, ..] = bytes;
-            match kind {
-                Kind::F4 => Self::Float(f32::from_le_bytes([a, b, c, d]).into()),
-                Kind::F8 => Self::Float(f64::from_le_bytes(bytes)),
-                Kind::I4 => Self::Integer(i32::from_le_bytes([a, b, c, d]).into()),
-                Kind::I8 => Self::Integer(i64::from_le_bytes(bytes)),
-            }
+            Self::Integer(match kind {
+                NpyKind::F4 => return Self::Float(f32::from_le_bytes([a, b, c, d]).into()),
+                NpyKind::F8 => return Self::Float(f64::from_le_bytes(bytes)),
+                NpyKind::I1 => i8::from_le_bytes([a]).into(),
+                NpyKind::Bool | NpyKind::U1 => a.into(),
+                NpyKind::I2 => i16::from_le_bytes([a, b]).into(),
+                NpyKind::U2 => u16::from_le_bytes([a, b]).into(),
+                NpyKind::I4 => i32::from_le_bytes([a, b, c, d]).into(),
+                NpyKind::U4 => u32::from_le_bytes([a, b, c, d]).into(),
+                NpyKind::I8 => i64::from_le_bytes(bytes),
+                NpyKind::U8 => match i64::try_from(u64::from_le_bytes(bytes)) {
+                    Ok(value) => value,
+                    Err(_) => return Self::Float(u64::from_le_bytes(bytes) as f64),
+                },
+            })
         }
     }
 }
@@ -107,6 +117,61 @@ pub fn read_vector<T: NpyNumber>(path: &Path) -> Result<Vec<T>, IoError> {
     Ok(matrix.into_data())
 }
 
+/// An array of numbers that keep their type: integers may be labels.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NpyArray {
+    /// Numbers with values in between, `[rows, cols]`.
+    Floats(Matrix, NpyKind),
+    /// Integers, `[rows, cols]`.
+    Integers(Matrix<i64>, NpyKind),
+}
+
+impl NpyArray {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Floats(values, _) => values.rows(),
+            Self::Integers(values, _) => values.rows(),
+        }
+    }
+}
+
+/// Reads a `.npy` array of one or two dimensions as it is; one of `n` numbers becomes `[n, 1]`.
+///
+/// # Errors
+/// As [`read_matrix`], and if an unsigned number exceeds 63 bits.
+pub fn read_npy(path: &Path) -> Result<NpyArray, IoError> {
+    let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
+    let array = Header::parse(&bytes).and_then(|header| match header.kind.is_float() {
+        true => decode(&bytes).map(|values| NpyArray::Floats(values, header.kind)),
+        false => decode(&bytes).map(|values| NpyArray::Integers(values, header.kind)),
+    });
+    array.map_err(|e| e.in_file(path))
+}
+
+/// Writes an array as `.npy` in its own type; one of a single column as `[rows]`.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_npy(path: &Path, array: &NpyArray) -> Result<(), IoError> {
+    let (rows, cols, kind) = match array {
+        NpyArray::Floats(values, kind) => (values.rows(), values.cols(), *kind),
+        NpyArray::Integers(values, kind) => (values.rows(), values.cols(), *kind),
+    };
+    let shape = if cols == 1 { format!("({rows},)") } else { format!("({rows}, {cols})") };
+    let mut bytes = header::encode(&kind.descr(), &shape);
+    match array {
+        NpyArray::Floats(values, NpyKind::F4) => {
+            values.data().iter().for_each(|&x| bytes.extend((x as f32).to_le_bytes()));
+        }
+        NpyArray::Floats(values, _) => values.data().iter().for_each(|x| bytes.extend(x.to_le_bytes())),
+        NpyArray::Integers(values, _) => {
+            values.data().iter().for_each(|x| bytes.extend(&x.to_le_bytes()[..kind.size()]));
+        }
+    }
+    write_atomically(path, |w| w.write_all(&bytes))
+}
+
 /// Writes a matrix `[rows, cols]` as `.npy`.
 ///
 /// # Errors
@@ -134,6 +199,11 @@ fn write<T: NpyNumber>(path: &Path, shape: &str, data: &[T]) -> Result<(), IoErr
         }
         Ok(())
     })
+}
+
+/// Whether these bytes begin as a `.npy` file.
+pub(super) fn is_npy(bytes: &[u8]) -> bool {
+    bytes.starts_with(header::MAGIC)
 }
 
 pub(super) fn decode<T: NpyNumber>(bytes: &[u8]) -> Parsed<Matrix<T>> {
@@ -173,15 +243,6 @@ impl Header {
             bytes[..item.len()].reverse();
         }
         sealed::Value::from_le_bytes(self.kind, bytes)
-    }
-}
-
-impl Kind {
-    fn size(self) -> usize {
-        match self {
-            Self::F4 | Self::I4 => 4,
-            Self::F8 | Self::I8 => 8,
-        }
     }
 }
 

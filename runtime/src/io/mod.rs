@@ -24,6 +24,7 @@
 mod assemble;
 mod atomic;
 mod attributes;
+mod carried;
 mod error;
 mod format;
 mod gltf;
@@ -32,28 +33,34 @@ mod obj;
 mod off;
 mod ply;
 mod point_map;
+mod reference;
 mod stl;
 mod surface_points;
 mod text;
+mod texture;
 
 use std::path::Path;
 
 pub use atomic::{remove_temporary_files, write_atomically};
-pub use attributes::{Attributes, Joint, MeshFile, ReadInfo, Skin, Texture};
+pub use attributes::{Attributes, IntegerField, IntegerKind, Joint, MeshFile, ReadInfo, Skin, Texture};
 pub use error::{IoError, Position};
 pub use format::MeshFormat;
-pub use matrix::{NpyNumber, read_matrix, read_vector, write_matrix, write_vector};
+pub use matrix::{
+    NpyArray, NpyKind, NpyNumber, read_matrix, read_npy, read_vector, write_matrix, write_npy, write_vector,
+};
 pub use point_map::{PointMapFormat, read_point_map, write_point_map};
+pub use reference::path_from_bytes;
 pub use surface_points::{read_surface_points, write_surface_points};
+pub use text::decode_text;
 
 use crate::Mesh;
 use error::Parsed;
 
-/// Reads a mesh and its attributes; the format is the extension's, or the content's where the extension is
-/// not one of [`MeshFormat`].
+/// Reads a mesh and its attributes. The format is the content's where that bears a mark, else the extension's, else what the content
+/// suggests.
 ///
 /// Polygons are split into triangle fans, several objects are concatenated in file order. What could not be
-/// kept is said in [`ReadInfo::warnings`].
+/// kept is said in [`ReadInfo::warnings`] and [`ReadInfo::left_out`]. Text files may be in UTF-8 or UTF-16.
 ///
 /// # Errors
 /// If the file cannot be read, is of no known format, or breaks its rules: then with the line, byte or part where it does.
@@ -68,19 +75,37 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, IoError> {
 /// # Errors
 /// As [`read_mesh`].
 pub fn decode_mesh(bytes: &[u8], path: &Path) -> Result<MeshFile, IoError> {
-    let format = MeshFormat::from_path(path).or_else(|| MeshFormat::from_content(bytes));
+    let named = MeshFormat::from_path(path);
+    let format = MeshFormat::certain(bytes).or(named).or_else(|| MeshFormat::from_content(bytes));
+    if let Some((problem, remedy)) = format::foreign(bytes) {
+        let error = error::ParseError::new(Position::Byte(0), problem, remedy);
+        return Err(error.in_file(path));
+    }
     let format =
         format.ok_or_else(|| IoError::UnknownFormat { path: path.into(), known: MeshFormat::READABLE })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    decode(bytes, format, folder).map_err(|e| e.in_file(path))
+    let mut file = decode(bytes, format, folder).map_err(|e| e.in_file(path))?;
+    let is_gltf = |format| matches!(format, MeshFormat::Gltf | MeshFormat::Glb);
+    if let Some(named) = named.filter(|&named| named != format && !(is_gltf(named) && is_gltf(format))) {
+        let warning =
+            format!("the name is that of {} file, but the content is {}", with_article(named), format.name());
+        file.info.warnings.push(warning);
+    }
+    Ok(file)
+}
+
+fn with_article(format: MeshFormat) -> String {
+    let article =
+        if matches!(format, MeshFormat::Off | MeshFormat::Obj | MeshFormat::Stl) { "an" } else { "a" };
+    format!("{article} {}", format.name())
 }
 
 fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
     match format {
-        MeshFormat::Off => off::read(bytes),
-        MeshFormat::Ply => ply::read(bytes, folder),
-        MeshFormat::Obj => obj::read(bytes, folder),
-        MeshFormat::Gltf | MeshFormat::Glb => gltf::read(bytes, folder),
+        MeshFormat::Off => off::read(&decode_text(bytes)),
+        MeshFormat::Ply => ply::read(&decode_text(bytes), folder),
+        MeshFormat::Obj => obj::read(&decode_text(bytes), folder),
+        MeshFormat::Gltf | MeshFormat::Glb => gltf::read(&decode_text(bytes), folder),
         MeshFormat::Stl => stl::read(bytes),
     }
 }

@@ -1,6 +1,6 @@
 //! Object File Format: OFF and its variants with colours (C), normals (N) and texture coordinates (ST) per vertex.
 //!
-//! Format: Geomview manual, section 4.2.5. Normals and the colours of faces are not kept.
+//! Format: Geomview manual, section 4.2.5. Colours of faces become colours of the vertices; normals are not kept.
 
 use std::path::Path;
 
@@ -76,9 +76,10 @@ fn read_header(lines: &mut Lines<'_>) -> Parsed<Header> {
 impl Header {
     /// Takes the letters before `OFF`; false where they are of no three-dimensional variant.
     fn set_variant(&mut self, prefix: &[u8]) -> bool {
+        let prefix = prefix.to_ascii_uppercase();
         let rest = prefix.strip_prefix(b"ST");
         self.uvs = rest.is_some();
-        let letters = rest.unwrap_or(prefix);
+        let letters = rest.unwrap_or(&prefix);
         self.normals = letters.contains(&b'N');
         self.colors = letters.contains(&b'C');
         letters.len() == usize::from(self.normals) + usize::from(self.colors)
@@ -88,19 +89,14 @@ impl Header {
 /// Reads the positions and colours into the builder; returns the texture coordinates, if there are any.
 fn read_vertices(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuilder) -> Parsed<Vec<[f32; 2]>> {
     builder.vertices.reserve_exact(header.n_vertices);
-    let (mut colors, mut uvs) = (Vec::new(), Vec::new());
-    let mut alpha = true;
+    let (mut colors, mut uvs) = (Colors::default(), Vec::new());
     for vertex in 0..header.n_vertices {
         let mut words = next_item(lines, "vertex", vertex, header.n_vertices)?;
         builder.vertices.push(words.point("a coordinate")?);
-        if header.normals {
-            (0..3).try_for_each(|_| words.expect("a normal's component").map(|_| ()))?;
-        }
         if header.colors {
-            let n_components =
-                words.clone().count() - if header.uvs { 2 } else { 0 }.min(words.clone().count());
-            alpha &= n_components >= 4;
-            colors.push(read_color(&mut words, n_components)?);
+            colors.read(&mut words, header)?;
+        } else if header.normals {
+            (0..3).try_for_each(|_| words.expect("a normal's component").map(|_| ()))?;
         }
         if header.uvs {
             uvs.push([
@@ -110,26 +106,54 @@ fn read_vertices(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuild
         }
     }
     if header.colors {
-        builder.attributes.vertex_colors = Some(colors_to_bytes(&colors, alpha));
+        builder.attributes.vertex_colors = Some(colors.to_bytes(header.normals));
     }
     Ok(uvs)
 }
 
-fn read_color(words: &mut Words<'_>, n_components: usize) -> Parsed<[f32; 4]> {
-    if !(3..=4).contains(&n_components) {
-        return Err(words.error(format!("a colour has 3 or 4 components, not {n_components}")));
+/// What stands between positions and texture coordinates: colours of three or four components and perhaps normals. The normals come first,
+/// but some programs write them behind the colours.
+#[derive(Default)]
+struct Colors {
+    /// The numbers of each vertex, and how many of them are the colour's.
+    rows: Vec<([f32; 7], usize)>,
+}
+
+impl Colors {
+    fn read(&mut self, words: &mut Words<'_>, header: &Header) -> Parsed<()> {
+        let n_normal = if header.normals { 3 } else { 0 };
+        let n_others = n_normal + if header.uvs { 2 } else { 0 };
+        let n_color = words.clone().count().saturating_sub(n_others);
+        if !(3..=4).contains(&n_color) {
+            return Err(words.error(format!("a colour has 3 or 4 components, not {n_color}")));
+        }
+        let mut numbers = [0.0; 7];
+        for number in &mut numbers[..n_normal + n_color] {
+            *number = words.finite("a component of the colour or normal")? as f32;
+        }
+        self.rows.push((numbers, n_color));
+        Ok(())
     }
-    let mut color = [1.0; 4];
-    for component in &mut color[..n_components] {
-        *component = words.finite("a colour component")? as f32;
+
+    fn to_bytes(&self, normals: bool) -> Vec<[u8; 4]> {
+        let is_unit = |x: &[f32]| (x.iter().map(|x| x * x).sum::<f32>().sqrt() - 1.0).abs() < 0.02;
+        let first = || self.rows.iter().all(|(row, _)| is_unit(&row[..3]));
+        let last = || self.rows.iter().all(|(row, n_color)| is_unit(&row[*n_color..n_color + 3]));
+        let from = if normals && (first() || !last()) { 3 } else { 0 };
+        let alpha = self.rows.iter().all(|(_, n_color)| *n_color == 4);
+        let color = |(row, n_color): &([f32; 7], usize)| {
+            let a = if *n_color == 4 { row[from + 3] } else { 1.0 };
+            [row[from], row[from + 1], row[from + 2], a]
+        };
+        let colors: Vec<[f32; 4]> = self.rows.iter().map(color).collect();
+        colors_to_bytes(&colors, alpha)
     }
-    Ok(color)
 }
 
 fn read_faces(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuilder) -> Parsed<()> {
     // A triangle's line has at least 8 bytes; a file of shorter ones only makes the vector grow.
     builder.faces.reserve(header.n_faces.min(lines.remaining() / 8 + 1));
-    let mut corners = Vec::new();
+    let (mut corners, mut colors, mut n_indices) = (Vec::new(), FaceColors::default(), 0);
     for face in 0..header.n_faces {
         let mut words = next_item(lines, "face", face, header.n_faces)?;
         let n_corners = words.size("the number of corners")?;
@@ -137,9 +161,51 @@ fn read_faces(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuilder)
         for _ in 0..n_corners {
             corners.push(words.index("vertex", header.n_vertices)?);
         }
+        let first = builder.faces.len();
         builder.polygon(&corners);
+        match words.clone().count() {
+            0 => {}
+            3 | 4 => colors.read(&mut words, first, builder.faces.len())?,
+            _ => n_indices += 1,
+        }
+    }
+    colors.spread(builder);
+    if n_indices > 0 {
+        let what = format!("the entry of {n_indices} faces in a colour map");
+        builder.info.left_out.push(what);
     }
     Ok(())
+}
+
+/// Colours behind the corners of faces, with the range of triangles that each belongs to.
+#[derive(Default)]
+struct FaceColors {
+    colors: Vec<[f32; 4]>,
+    triangles: Vec<std::ops::Range<usize>>,
+    without_alpha: bool,
+}
+
+impl FaceColors {
+    fn read(&mut self, words: &mut Words<'_>, first: usize, end: usize) -> Parsed<()> {
+        let n_components = words.clone().count();
+        let mut color = [1.0; 4];
+        for component in &mut color[..n_components] {
+            *component = words.finite("a colour component")? as f32;
+        }
+        self.without_alpha |= n_components == 3;
+        self.colors.push(color);
+        self.triangles.push(first..end);
+        Ok(())
+    }
+
+    fn spread(self, builder: &mut MeshBuilder) {
+        let bytes = colors_to_bytes(&self.colors, !self.without_alpha);
+        let mut of_face = vec![None; builder.faces.len()];
+        for (range, color) in self.triangles.into_iter().zip(bytes) {
+            of_face[range].fill(Some(color));
+        }
+        builder.spread_face_colors(&of_face, "faces");
+    }
 }
 
 fn next_line<'a>(lines: &mut Lines<'a>, what: &str) -> Parsed<Words<'a>> {
@@ -187,7 +253,52 @@ mod tests {
         assert_eq!(file.mesh.n_vertices(), 4);
         assert_eq!(file.mesh.faces(), [[0, 1, 2], [0, 2, 3], [0, 2, 3]]);
         assert_eq!((file.info.n_polygons, file.info.n_ignored_faces), (1, 1));
-        assert_eq!(file.attributes, Attributes::default());
+        let grey = [128, 128, 128, 255];
+        assert_eq!(file.attributes.vertex_colors, Some(vec![grey; 4]));
+    }
+
+    #[test]
+    fn colors_of_every_range_and_order() {
+        let colors = |text: &str| read_text(text).unwrap().attributes.vertex_colors.unwrap();
+        // Whole numbers that are fractions all the same, as %g prints them; with an alpha of 1 behind bytes; 16 bits.
+        assert_eq!(
+            colors("COFF\n2 0 0\n0 0 0 1 0 0 1\n0 0 0 0 0 1 1\n"),
+            [[255, 0, 0, 255], [0, 0, 255, 255]]
+        );
+        assert_eq!(
+            colors("COFF\n2 0 0\n0 0 0 255 0 0 1\n0 0 0 0 7 1 1\n"),
+            [[255, 0, 0, 255], [0, 7, 1, 255]]
+        );
+        assert_eq!(colors("COFF\n1 0 0\n0 0 0 65535 0 257\n"), [[255, 0, 1, 255]]);
+        // Normals in front, where they belong, and behind.
+        let expected = [[255, 128, 0, 255], [0, 0, 1, 255]];
+        assert_eq!(colors("CNOFF\n2 0 0\n0 0 0 0 0 1 255 128 0\n0 0 0 0.6 0.8 0 0 0 1\n"), expected);
+        assert_eq!(colors("NCOFF\n2 0 0\n0 0 0 255 128 0 0 0 1\n0 0 0 0 0 1 0.6 0.8 0\n"), expected);
+    }
+
+    #[test]
+    fn colors_of_faces_come_to_the_vertices() {
+        let text =
+            "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 255 0 0\n3 1 3 2 0 0 255 255\n3 0 1 3 5\n";
+        let file = read_text(text).unwrap();
+        let mixed = [128, 0, 128, 255];
+        let expected = [[255, 0, 0, 255], mixed, mixed, [0, 0, 255, 255]];
+        assert_eq!(file.attributes.vertex_colors.unwrap(), expected);
+        assert!(file.info.left_out.iter().any(|what| what.contains("1 faces in a colour map")));
+        // Colours of the vertices themselves come before those of the faces.
+        let file =
+            read_text("COFF\n3 1 0\n0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n3 0 1 2 255 0 0\n").unwrap();
+        assert_eq!(file.attributes.vertex_colors.unwrap(), [[9, 9, 9, 255]; 3]);
+        assert!(file.info.left_out[0].contains("the vertices have their own"));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused_in_any_spelling() {
+        for number in ["1.#INF00", "-1.#IND00", "1.#QNAN0", "nan(ind)", "inf"] {
+            let error =
+                read_text(&format!("OFF\n1 0 0\n0 0 {number}\n")).unwrap_err().in_file(Path::new("a.off"));
+            assert!(error.to_string().contains("line 3: a coordinate is not finite"), "{error}");
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@
 use std::path::Path;
 
 use super::error::{ParseError, Parsed};
-use super::text::{Lines, Words, float, integer, quote};
+use super::text::{Lines, Words, decode_text, float, integer, quote};
 use super::{IoError, matrix, write_atomically, write_vector};
 use crate::point_map::PointMap;
 
@@ -49,7 +49,7 @@ impl PointMapFormat {
     }
 }
 
-/// Reads a point map; the extension decides on the format.
+/// Reads a point map; the extension decides on the format, but NumPy's is known by its first bytes. Text may be in UTF-8 or UTF-16.
 ///
 /// `n_target` is the number of target vertices, against which every index is checked; where it is `None` it is
 /// what the file states (`.csv`), else one more than the largest index.
@@ -106,6 +106,10 @@ fn write_csv(path: &Path, map: &PointMap) -> Result<(), IoError> {
 }
 
 pub(super) fn decode(bytes: &[u8], format: PointMapFormat, n_target: Option<usize>) -> Parsed<PointMap> {
+    if matrix::is_npy(bytes) {
+        return decode_npy(bytes, n_target);
+    }
+    let bytes = &*decode_text(bytes);
     match format {
         PointMapFormat::Txt => decode_lines(bytes, 0, n_target),
         PointMapFormat::Vts => decode_lines(bytes, 1, n_target),

@@ -1,9 +1,48 @@
 //! Text files as bytes: lines, words and numbers, without a `String` per line.
 
+use std::borrow::Cow;
+
 use super::error::{ParseError, Parsed, REEXPORT};
 
 /// A byte order mark that some editors put in front.
 const BOM: &[u8] = b"\xEF\xBB\xBF";
+
+/// A text file's bytes as UTF-8 without a byte order mark.
+///
+/// UTF-16 of either byte order is known by its mark, or without one by the zeros beside the first two characters. Bytes in any other
+/// encoding stay as they are.
+pub fn decode_text(bytes: &[u8]) -> Cow<'_, [u8]> {
+    match bytes {
+        [0xFF, 0xFE, rest @ ..] => decode_utf16(rest, u16::from_le_bytes),
+        [0xFE, 0xFF, rest @ ..] => decode_utf16(rest, u16::from_be_bytes),
+        [a, 0, b, 0, ..] if *a > 0 && *b > 0 => decode_utf16(bytes, u16::from_le_bytes),
+        [0, a, 0, b, ..] if *a > 0 && *b > 0 => decode_utf16(bytes, u16::from_be_bytes),
+        _ => bytes.strip_prefix(BOM).unwrap_or(bytes).into(),
+    }
+}
+
+fn decode_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Cow<'_, [u8]> {
+    let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+    let text: String = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    text.into_bytes().into()
+}
+
+/// What stands before a comment.
+///
+/// A `#` begins one wherever it stands, but not within `1.#INF`, `-1.#IND` and the like: so old run-times of Microsoft print numbers that
+/// are not finite.
+pub(super) fn without_comment(line: &[u8]) -> &[u8] {
+    let mut from = 0;
+    while let Some(at) = line[from..].iter().position(|&b| b == b'#').map(|at| at + from) {
+        let in_number =
+            line[..at].ends_with(b"1.") && line.get(at + 1).is_some_and(|b| b.is_ascii_alphabetic());
+        if !in_number {
+            return &line[..at];
+        }
+        from = at + 1;
+    }
+    line
+}
 
 /// The lines of a text file, numbered from 1, ended by `\n`, `\r\n` or (in files without any `\n`) `\r`.
 pub(super) struct Lines<'a> {
@@ -33,10 +72,7 @@ impl<'a> Lines<'a> {
     pub(super) fn next_data(&mut self) -> Option<Words<'a>> {
         loop {
             let line = self.next()?;
-            let data = match line.iter().position(|&b| b == b'#') {
-                Some(comment) => &line[..comment],
-                None => line,
-            };
+            let data = without_comment(line);
             if !data.trim_ascii().is_empty() {
                 return Some(Words::new(data, self.number));
             }
@@ -145,9 +181,32 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// A decimal number, `nan` and `inf` included.
+/// A decimal number, in whatever way a run-time prints it: also `nan`, `-nan(ind)`, `inf`, `1.#INF00`, and `1.0D+02` of Fortran.
 pub(super) fn float(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
+    let text = std::str::from_utf8(word).ok()?;
+    text.parse().ok().or_else(|| unusual_float(text))
+}
+
+#[cold]
+fn unusual_float(text: &str) -> Option<f64> {
+    let lower = text.to_ascii_lowercase();
+    let (sign, digits) = match lower.strip_prefix(['-', '+']) {
+        Some(digits) => (if lower.starts_with('-') { -1.0 } else { 1.0 }, digits),
+        None => (1.0, lower.as_str()),
+    };
+    if let Some(kind) = digits.strip_prefix("1.#").filter(|kind| kind.starts_with(char::is_alphabetic)) {
+        // `1.#J` is `1.#INF` rounded to two places, as the run-time does it.
+        return Some(sign * if kind.starts_with("inf") || kind == "j" { f64::INFINITY } else { f64::NAN });
+    }
+    if let Some(kind) = digits.strip_prefix("nan") {
+        return (kind.starts_with('(') && kind.ends_with(')')).then_some(f64::NAN);
+    }
+    let (mantissa, exponent) = digits.split_once('d')?;
+    let plain = |part: &str| part.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+    if !plain(mantissa) || !plain(exponent) {
+        return None;
+    }
+    Some(sign * format!("{mantissa}e{exponent}").parse::<f64>().ok()?)
 }
 
 /// A decimal integer, also one written as `3.0` or `3.0e0`, as NumPy's `savetxt` does.
@@ -180,6 +239,56 @@ mod tests {
             assert_eq!(lines.next_data().unwrap().next(), Some(&b"b"[..]));
             assert_eq!(lines.number(), 3);
             assert!(lines.next_data().is_none());
+        }
+    }
+
+    #[test]
+    fn every_encoding_of_unicode_gives_the_same_text() {
+        let text = "OFF # gr\u{f6}\u{df}e \u{1d11e}\n";
+        let units: Vec<u16> = text.encode_utf16().collect();
+        let little: Vec<u8> = units.iter().flat_map(|u| u.to_le_bytes()).collect();
+        let big: Vec<u8> = units.iter().flat_map(|u| u.to_be_bytes()).collect();
+        for bytes in [
+            text.as_bytes().to_vec(),
+            [BOM, text.as_bytes()].concat(),
+            [&[0xFF, 0xFE], &little[..]].concat(),
+            [&[0xFE, 0xFF], &big[..]].concat(),
+            little,
+            big,
+        ] {
+            assert_eq!(decode_text(&bytes), text.as_bytes());
+        }
+        assert_eq!(*decode_text(b"\xFF\xFEa\0\x00\xD8b\0c"), *"a\u{fffd}b".as_bytes());
+        assert_eq!(*decode_text(b"k\xf6rper"), *b"k\xf6rper");
+        assert_eq!(*decode_text(b""), *b"");
+    }
+
+    #[test]
+    fn numbers_of_old_run_times_are_no_comments() {
+        for (line, expected) in [
+            (&b"0 1.#INF00 2 # note"[..], &b"0 1.#INF00 2 "[..]),
+            (b"-1.#IND 1.#QNAN0", b"-1.#IND 1.#QNAN0"),
+            (b"1.# note", b"1."),
+            (b"3#corner", b"3"),
+            (b"#", b""),
+        ] {
+            assert_eq!(without_comment(line), expected);
+        }
+    }
+
+    #[test]
+    fn numbers_as_other_run_times_print_them() {
+        for word in ["1.#INF", "1.#INF00", "+1.#inf", "1.#J"] {
+            assert_eq!(float(word.as_bytes()), Some(f64::INFINITY), "{word}");
+        }
+        assert_eq!(float(b"-1.#INF"), Some(f64::NEG_INFINITY));
+        for word in ["-1.#IND", "1.#QNAN0", "1.#SNAN", "nan(ind)", "-nan(snan)", "-nan", "NaN"] {
+            assert!(float(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        assert_eq!(float(b"1.5D+02"), Some(150.0));
+        assert_eq!(float(b"-1d-1"), Some(-0.1));
+        for word in ["d", "1d", "d1", "1.#", "2.#INF", "nanny", "infd1", "0x1p3", "1,5"] {
+            assert_eq!(float(word.as_bytes()), None, "{word}");
         }
     }
 

@@ -19,6 +19,7 @@ pub mod vec3;
 pub use closest_point::{ClosestPoint, carried_points, closest_points};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use nearest::{nearest_k_vertices, nearest_vertices};
+pub(crate) use repair::weld;
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
 pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
 pub use surface_point::{SurfacePoint, vertices_on_surface};

@@ -2,6 +2,7 @@
 
 mod blend;
 mod colormap;
+mod fit;
 mod pair;
 mod picture;
 mod transfer;
@@ -9,6 +10,7 @@ mod uv;
 mod viewer;
 
 pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
+pub use fit::fit_skeleton;
 pub use pair::side_by_side;
 pub use picture::{Picture, pair_picture, picture, textured_picture};
 pub use transfer::{Donors, transfer_attributes, transfer_landmarks, transfer_values};

@@ -6,7 +6,7 @@
 
 use super::blend::{Blend, blends};
 use super::uv::corner_uvs;
-use crate::io::{Attributes, Skin};
+use crate::io::{Attributes, IntegerField, Skin};
 use crate::mesh::{Topology, vec3};
 use crate::point_map::PointMap;
 use crate::{Matrix, Mesh};
@@ -107,6 +107,17 @@ impl Donors {
         self.places[receiving].map(|place| place.blend)
     }
 
+    /// The vertex that each receiving vertex takes values from that cannot be mixed: the corner of the largest weight.
+    pub fn nearest_vertices(&self) -> impl Iterator<Item = Option<usize>> + '_ {
+        self.shares().map(|shares| {
+            let largest = |[a, b, c]: [(usize, f64); 3]| {
+                let first = if b.1 > a.1 { b } else { a };
+                if c.1 > first.1 { c.0 } else { first.0 }
+            };
+            shares.map(largest)
+        })
+    }
+
     /// Vertices and weights that each receiving vertex takes from; `None` without a match.
     fn shares(&self) -> impl Iterator<Item = Option<[(usize, f64); 3]>> + '_ {
         self.nearest.iter().zip(&self.places).map(|(nearest, place)| match place {
@@ -141,7 +152,8 @@ impl Ord for Ordered {
     }
 }
 
-/// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match.
+/// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match. Labels want
+/// [`Donors::nearest_vertices`] instead.
 ///
 /// # Panics
 /// If a donor has no row.
@@ -175,7 +187,7 @@ pub fn transfer_landmarks(
 
 /// Colours, texture coordinates, scalar fields and skin weights of the giver, for the receiver's vertices and corners.
 ///
-/// Vertices without a match are grey, NaN and without weights, triangles without any at the texture's origin. At a seam of the giver's
+/// Vertices without a match are grey, NaN, -1 (0 where the type has no sign) and without weights, triangles without any at the texture's origin. At a seam of the giver's
 /// texture a vertex has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
 ///
 /// # Panics
@@ -190,8 +202,8 @@ pub fn transfer_attributes(
         let mixed = |shares| [0, 1, 2, 3].map(|c| weighted(shares, |v| colors[v][c].into()).round() as u8);
         shares.map_or(super::UNMATCHED_COLOR, mixed)
     };
-    let scalar = |values: &[f32], shares: Option<[(usize, f64); 3]>| {
-        shares.map_or(f32::NAN, |shares| weighted(shares, |v| values[v].into()) as f32)
+    let scalar = |values: &[f64], shares: Option<[(usize, f64); 3]>| {
+        shares.map_or(f64::NAN, |shares| weighted(shares, |v| values[v]))
     };
     let scalars = attributes.vertex_scalars.iter();
     Attributes {
@@ -204,8 +216,19 @@ pub fn transfer_attributes(
         vertex_scalars: scalars
             .map(|(name, values)| (name.clone(), donors.shares().map(|s| scalar(values, s)).collect()))
             .collect(),
+        vertex_integers: attributes
+            .vertex_integers
+            .iter()
+            .map(|field| transfer_integers(field, donors))
+            .collect(),
         skin: attributes.skin.as_ref().map(|skin| transfer_skin(skin, donors)),
     }
+}
+
+/// Integers are names, not quantities: each vertex takes those of the nearest giving vertex; `missing` without a match.
+fn transfer_integers(field: &IntegerField, donors: &Donors) -> IntegerField {
+    let values = donors.nearest_vertices().map(|v| v.map_or(field.kind.missing(), |v| field.values[v]));
+    IntegerField { name: field.name.clone(), kind: field.kind, values: values.collect() }
 }
 
 /// The four largest of the weights that come together at each vertex, with the same sum.
@@ -267,6 +290,26 @@ mod tests {
             let nearer = if corner(v, 0) < corner(v, 99) { 0 } else { 1 };
             let tie = (corner(v, 0) - corner(v, 99)).abs() < 0.3;
             assert!(tie || donor == Some(nearer), "vertex {v} takes from {donor:?}");
+        }
+    }
+
+    #[test]
+    fn labels_are_never_mixed() {
+        let (coarse, fine) = (icosphere(1), icosphere(3));
+        let n = coarse.n_vertices();
+        let labels: Vec<i64> =
+            coarse.vertices().iter().map(|p| if p[0] > 0.0 { 16_777_217 } else { 11 }).collect();
+        let field = IntegerField { name: "label".into(), kind: crate::io::IntegerKind::I32, values: labels };
+        let mut nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
+        nearest[7] = PointMap::UNMATCHED;
+        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse);
+        let given = Attributes { vertex_integers: vec![field.clone()], ..Attributes::default() };
+        let moved = &transfer_attributes(&coarse, &given, &fine, &donors).vertex_integers[0];
+        assert_eq!((moved.kind, moved.values.len(), moved.values[7]), (field.kind, fine.n_vertices(), -1));
+        for (v, label) in moved.values.iter().enumerate().filter(|(v, _)| *v != 7) {
+            let x = fine.vertices()[v][0];
+            assert!([11, 16_777_217].contains(label));
+            assert!(x.abs() < 0.4 || (*label == 11) == (x < 0.0), "vertex {v} at {x}: {label}");
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::{map_colors, position_colors};
 use crate::Mesh;
+use crate::mesh::vec3;
 use crate::point_map::PointMap;
 use serde_json::json;
 
@@ -45,13 +46,23 @@ pub fn viewer_html(pair: &ViewerPair) -> String {
 }
 
 fn shape(name: &str, mesh: &Mesh, colors: &[[u8; 4]]) -> serde_json::Value {
-    let positions: Vec<f32> = mesh.vertices().iter().flatten().map(|&x| x as f32).collect();
+    let positions = local_positions(mesh);
     json!({
         "name": name,
         "positions": base64(bytemuck::cast_slice(&positions)),
         "faces": base64(bytemuck::cast_slice(mesh.faces())),
         "colors": base64(bytemuck::cast_slice(colors)),
     })
+}
+
+/// Positions relative to the middle of the bounding box: single precision is for the shape alone, not for where it is.
+fn local_positions(mesh: &Mesh) -> Vec<[f32; 3]> {
+    let range = |axis: usize| {
+        let coordinates = mesh.vertices().iter().map(|p| p[axis]);
+        coordinates.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+    };
+    let middle = [0, 1, 2].map(|axis| 0.5 * range(axis).0 + 0.5 * range(axis).1);
+    mesh.vertices().iter().map(|p| vec3::sub(*p, middle).map(|x| x as f32)).collect()
 }
 
 fn escaped(text: &str) -> String {
@@ -85,6 +96,16 @@ mod tests {
         {
             assert_eq!(base64(plain.as_bytes()), encoded);
         }
+    }
+
+    #[test]
+    fn a_mesh_far_from_the_origin_keeps_its_shape() {
+        let (near, at) = (icosphere(1), [512_345.678, 5_412_345.678, 123.0]);
+        let vertices = near.vertices().iter().map(|p| vec3::add(*p, at)).collect();
+        let far = Mesh::new(vertices, near.faces().to_vec()).unwrap();
+        let (near, far) = (local_positions(&near), local_positions(&far));
+        let pairs = near.as_flattened().iter().zip(far.as_flattened());
+        pairs.for_each(|(a, b)| assert!((a - b).abs() < 1e-6, "{a} {b}"));
     }
 
     #[test]

@@ -4,7 +4,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::network::Backend;
 use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 /// Dense correspondence between deformable 3D shapes: two meshes in, a map out.
 ///
@@ -58,7 +59,7 @@ pub(crate) enum Command {
 pub(crate) struct ShapeArgs {
     /// Model file, or the name of one in ./models [default: the model built into this program]
     #[arg(long, value_name = "NAME|FILE")]
-    pub(crate) model: Option<String>,
+    pub(crate) model: Option<PathBuf>,
     /// What computes the network
     #[arg(long, value_enum, default_value = "tract")]
     pub(crate) backend: Backend,
@@ -99,6 +100,7 @@ pub(crate) struct PipelineArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  fmnet-infer demo -o demo.html")]
 pub(crate) struct DemoArgs {
     /// Where the viewer is written
     #[arg(short, long, value_name = "FILE.html", default_value = "fmnet-demo.html")]
@@ -106,6 +108,7 @@ pub(crate) struct DemoArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  fmnet-infer match man.obj woman.glb -o map.txt -o pair.html")]
 pub(crate) struct MatchArgs {
     /// Mesh whose vertices are to be matched
     pub(crate) source: PathBuf,
@@ -128,10 +131,13 @@ pub(crate) struct MatchArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  fmnet-infer batch pairs.txt --root scans --out maps")]
 pub(crate) struct BatchArgs {
-    /// Text file with a pair of mesh files a line, separated by white space or a tab; # begins a comment
+    /// Text file with a pair of mesh files a line, separated by white space, a comma or a tab; names with spaces may stand in
+    /// quotes; # begins a comment. `-` is standard input
     pub(crate) pairs: PathBuf,
-    /// Folder for the maps, SOURCE__TARGET.EXT; pairs whose map is there already are skipped
+    /// Folder for the maps, SOURCE__TARGET.EXT, each with a .key file that says what it was made from. A map that is there is
+    /// kept where both meshes, the model and every option are the same as then, else made anew
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Format of the maps
@@ -148,6 +154,9 @@ pub(crate) struct BatchArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  fmnet-infer transfer scan.obj rig.glb --map scan_to_rig.txt -o rigged_scan.glb"
+)]
 pub(crate) struct TransferArgs {
     /// Source mesh of the map
     pub(crate) source: PathBuf,
@@ -160,11 +169,12 @@ pub(crate) struct TransferArgs {
     /// source: each vertex from the source vertex whose match is nearest
     #[arg(long, value_enum, default_value = "source")]
     pub(crate) to: Receiver,
-    /// Per-vertex values of the giving mesh to carry over as well: scalar fields or skin weights [n] or [n, q] (.npy),
-    /// or landmarks (.txt, a 0-based vertex a line); each needs an output of its extension
+    /// Per-vertex values of the giving mesh to carry over as well: scalar fields, skin weights or labels [n] or [n, q]
+    /// (.npy; integers are labels and never mixed), or landmarks (.txt, a 0-based vertex a line); each needs an output of
+    /// its extension
     #[arg(long, value_name = "FILE")]
     pub(crate) values: Vec<PathBuf>,
-    /// Output: the receiving mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file; or, for each
+    /// Output: the receiving mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file beside its own; or, for each
     /// --values in turn, a file of the same kind (.npy, .txt)
     #[arg(short, long = "output", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
@@ -178,12 +188,13 @@ pub(crate) enum Receiver {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  fmnet-infer features man.ply --out features -k 100")]
 pub(crate) struct FeaturesArgs {
     /// The mesh
     pub(crate) mesh: PathBuf,
     /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], shot.npy [n,352] and, with learned
     /// descriptors, descriptors.npy [n,352]; where the mesh was repaired or decimated so that vertices differ from the
-    /// file's, also vertices.npy [n]: the file's vertex of each row
+    /// file's, also vertices.npy [n]: the file's vertex of each row. Files of an earlier run are replaced or removed
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
@@ -191,6 +202,9 @@ pub(crate) struct FeaturesArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  fmnet-infer evaluate map.txt --source a.ply --target b.ply --ground-truth identity -o curve.svg"
+)]
 pub(crate) struct EvaluateArgs {
     /// Maps to evaluate, of the same pair; several are drawn into one plot
     #[arg(required = true)]
@@ -204,16 +218,17 @@ pub(crate) struct EvaluateArgs {
     /// `identity` (vertex i corresponds with vertex i), a map file, or two .vts files separated by a comma (line i of the
     /// one corresponds with line i of the other)
     #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
-    pub(crate) ground_truth: String,
+    pub(crate) ground_truth: OsString,
     /// Second ground truth, the left-right mirrored one; the better of the two counts
     #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
-    pub(crate) symmetric_ground_truth: Option<String>,
+    pub(crate) symmetric_ground_truth: Option<OsString>,
     /// Output: .csv (curve), .svg (plot) or .html (report with pictures); may be given several times
     #[arg(short, long = "output")]
     pub(crate) outputs: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  fmnet-infer inspect man.obj")]
 pub(crate) struct InspectArgs {
     /// A mesh file, or a model (.onnx)
     pub(crate) file: PathBuf,
@@ -249,11 +264,16 @@ fn radius(text: &str) -> Result<f64, String> {
 }
 
 impl ShapeArgs {
+    /// The file of the model, if one is named.
+    pub(crate) fn model_file(&self) -> Option<PathBuf> {
+        self.model.as_deref().map(model_path)
+    }
+
     /// The library's options, those of matching at their defaults.
     pub(crate) fn to_options(&self) -> MatchOptions {
         MatchOptions {
             descriptor: self.descriptor,
-            model: self.model.as_deref().map_or(ModelSource::Embedded, |m| ModelSource::File(model_path(m))),
+            model: self.model_file().map_or(ModelSource::Embedded, ModelSource::File),
             backend: self.backend,
             k: self.k.map(usize::from),
             shot_radius: self.shot_radius,
@@ -277,7 +297,8 @@ impl PipelineArgs {
 }
 
 /// A path, or the name of a model in `./models`.
-fn model_path(model: &str) -> PathBuf {
-    let named = PathBuf::from("models").join(model).join("model.onnx");
-    if !model.ends_with(".onnx") && named.is_file() { named } else { PathBuf::from(model) }
+fn model_path(model: &Path) -> PathBuf {
+    let named = Path::new("models").join(model).join("model.onnx");
+    let is_file = model.extension().is_some_and(|e| e == "onnx");
+    if !is_file && named.is_file() { named } else { model.into() }
 }

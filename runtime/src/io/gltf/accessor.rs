@@ -5,6 +5,7 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::validation::Checked;
 
 use super::document::Document;
+use crate::io::attributes::IntegerKind;
 use crate::io::error::{ParseError, Parsed, Position, TRUNCATED};
 
 /// What integers stand for.
@@ -12,7 +13,7 @@ use crate::io::error::{ParseError, Parsed, Position, TRUNCATED};
 pub(super) enum Integers {
     /// Themselves, unless the accessor says that they are fractions.
     AsStated,
-    /// Fractions of the largest one, as in colours, weights and texture coordinates.
+    /// Fractions of the largest one, as in colours and weights.
     Fractions,
 }
 
@@ -39,6 +40,20 @@ impl Document<'_> {
             Checked::Valid(type_) => Ok((type_.multiplicity(), accessor.count.0 as usize)),
             Checked::Invalid => Err(error(index, "it has no valid type")),
         }
+    }
+
+    /// The type of an accessor's integers, unless they stand for fractions.
+    pub(super) fn integer_kind(&self, index: Index<Accessor>) -> Option<IntegerKind> {
+        let accessor = self.root.get(index).filter(|accessor| !accessor.normalized)?;
+        let Checked::Valid(component) = &accessor.component_type else { return None };
+        Some(match component.0 {
+            ComponentType::I8 => IntegerKind::I8,
+            ComponentType::U8 => IntegerKind::U8,
+            ComponentType::I16 => IntegerKind::I16,
+            ComponentType::U16 => IntegerKind::U16,
+            ComponentType::U32 => IntegerKind::U32,
+            ComponentType::F32 => return None,
+        })
     }
 
     /// The items of an accessor of `N` components; every number type fits `f64` exactly.

@@ -5,6 +5,8 @@ use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use gltf::json::accessor::Accessor;
+use gltf::json::mesh::Primitive;
 use gltf::json::{self, Root};
 
 use super::uri::{self, Target};
@@ -18,8 +20,9 @@ const MAX_ITEMS_PER_BYTE: usize = 16;
 const COMPRESSIONS: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Required extensions that do not touch what is read here, by the beginning of their names.
-const HARMLESS: [&str; 6] = [
+/// Required extensions that are applied, or do not touch what is read here, by the beginning of their names.
+const HARMLESS: [&str; 7] = [
+    "EXT_mesh_gpu_instancing",
     "KHR_mesh_quantization",
     "KHR_materials_",
     "KHR_lights_",
@@ -34,6 +37,8 @@ pub(super) struct Document<'a> {
     blobs: Vec<Cow<'a, [u8]>>,
     /// The index in `blobs` of each buffer.
     blob_of_buffer: Vec<usize>,
+    /// The files of the buffers.
+    files: Vec<PathBuf>,
     /// How many more vertices and corners may be read.
     budget: Cell<usize>,
 }
@@ -49,6 +54,7 @@ impl<'a> Document<'a> {
             folder: folder.into(),
             blobs: Vec::new(),
             blob_of_buffer: Vec::new(),
+            files: Vec::new(),
             budget: Cell::new(0),
         };
         document.load_buffers(binary)?;
@@ -63,8 +69,12 @@ impl<'a> Document<'a> {
             let fail = |problem: String| ParseError::part(format!("buffer {i}"), problem);
             let blob = match &buffer.uri {
                 None => {
-                    let binary =
-                        binary.take().ok_or_else(|| fail("there is no binary chunk for it".into()))?;
+                    let compression = buffer.extensions.as_ref().and_then(|e| compression(&e.others));
+                    let missing = || match compression {
+                        Some(name) => compressed(format!("buffer {i}"), name),
+                        None => fail("there is no binary chunk for it".into()),
+                    };
+                    let binary = binary.take().ok_or_else(missing)?;
                     push(&mut self.blobs, binary)
                 }
                 Some(uri) => match uri::resolve(uri, &self.folder).map_err(fail)? {
@@ -79,6 +89,7 @@ impl<'a> Document<'a> {
                             None => {
                                 let bytes = read_regular_file(&path).map_err(cannot_read)?;
                                 let blob = push(&mut self.blobs, bytes.into());
+                                self.files.push(path.clone());
                                 blob_of_file.insert(path, blob);
                                 blob
                             }
@@ -107,6 +118,25 @@ impl<'a> Document<'a> {
         let bytes = start.checked_add(length).and_then(|end| self.blobs[*blob].get(start..end));
         let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
         Ok((bytes.ok_or_else(|| fail("it reaches beyond its buffer"))?, stride))
+    }
+
+    /// The files of the buffers.
+    pub(super) fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// Refuses a primitive that has nothing but compressed data.
+    pub(super) fn check_compression(
+        &self,
+        primitive: &Primitive,
+        positions: json::Index<Accessor>,
+    ) -> Parsed<()> {
+        let Some(name) = primitive.extensions.as_ref().and_then(|e| compression(&e.others)) else {
+            return Ok(());
+        };
+        let is_plain =
+            self.root.get(positions).is_some_and(|a| a.buffer_view.is_some() || a.sparse.is_some());
+        if is_plain { Ok(()) } else { Err(compressed("scene".into(), name)) }
     }
 
     /// Counts `n` vertices or corners against what a file of this size may hold.
@@ -151,6 +181,16 @@ fn split(bytes: &[u8]) -> Parsed<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>)> {
     };
     let glb = gltf::Glb::from_slice(content).map_err(|e| ParseError::byte(12, e.to_string()))?;
     Ok((glb.json, glb.bin))
+}
+
+/// Which of the compressions is among the extensions of something.
+fn compression(extensions: &serde_json::Map<String, serde_json::Value>) -> Option<&'static str> {
+    COMPRESSIONS.into_iter().find(|name| extensions.contains_key(*name))
+}
+
+fn compressed(part: String, name: &str) -> ParseError {
+    let problem = format!("the mesh is compressed with '{name}', which is not supported");
+    ParseError::new(Position::Part(part), problem, "export the mesh without compression")
 }
 
 fn check_extensions(root: &Root) -> Parsed<()> {

@@ -2,10 +2,14 @@
 //!
 //! The crate `gltf` gives the container and the data types; its accessors and iterators panic on indices and offsets
 //! that are out of range, so every reference is looked up with a check here. Skinned meshes are placed by their joints, as
-//! the specification (section 3.7.3.3) demands; morph targets and animations are not applied.
+//! the specification (section 3.7.3.3) demands, morph targets applied with the weights that the file gives them; animations are not
+//! applied.
 
 mod accessor;
+mod color;
 mod document;
+mod influences;
+mod material;
 mod matrix4;
 mod nodes;
 mod scene;

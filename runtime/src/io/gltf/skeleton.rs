@@ -55,25 +55,22 @@ impl Skeleton {
         Ok(Self { matrices: matrices.collect(), joints: place })
     }
 
-    /// The indices in the skeleton of the whole file of a vertex's joints; `None` where one that acts does not exist.
-    pub(super) fn indices(&self, joints: &[f64; 4], weights: &[f32; 4]) -> Option<[u16; 4]> {
-        let mut indices = [0; 4];
-        for c in 0..4 {
-            match self.joints.get(joints[c] as usize) {
-                Some(&joint) => indices[c] = joint,
-                None if weights[c] == 0.0 => {}
-                None => return None,
-            }
-        }
-        Some(indices)
+    /// The index in the skeleton of the whole file of one of the skin's joints, if it exists.
+    pub(super) fn joint(&self, joint: f64) -> Option<u16> {
+        self.joints.get(joint as usize).copied()
     }
 
-    /// The place in the world of a vertex whose joints exist: linear blend skinning.
-    pub(super) fn pose(&self, position: [f64; 3], joints: &[f64; 4], weights: &[f32; 4]) -> Option<[f64; 3]> {
-        let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
+    /// The place in the world of a vertex that these joints move: linear blend skinning. `None` where a joint does not exist or nothing
+    /// moves it.
+    pub(super) fn pose<I: Iterator<Item = (f64, f32)>>(
+        &self,
+        position: [f64; 3],
+        influences: impl Fn() -> I,
+    ) -> Option<[f64; 3]> {
+        let total: f64 = influences().map(|(_, w)| f64::from(w)).sum();
         let mut posed = [0.0; 3];
-        for (joint, &weight) in joints.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0) {
-            let moved = matrix4::apply(&self.matrices[*joint as usize], position);
+        for (joint, weight) in influences() {
+            let moved = matrix4::apply(self.matrices.get(joint as usize)?, position);
             posed = [0, 1, 2].map(|axis| posed[axis] + f64::from(weight) / total * moved[axis]);
         }
         (total > 0.0).then_some(posed)

@@ -2,7 +2,7 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::Mesh;
-use crate::io::{Attributes, Joint, Skin, Texture};
+use crate::io::{Attributes, IntegerField, IntegerKind, Joint, Skin, Texture};
 
 /// A GLB file of JSON and binary chunk.
 fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
@@ -93,7 +93,8 @@ fn sparse_and_interleaved_accessors() {
     document["meshes"] = json!([{"primitives": [primitive]}]);
     let file = read_glb(&document, &binary).unwrap();
     assert_eq!(file.mesh.vertices()[2..], [[2.0, 0.0, 0.0], [7.0, 8.0, 9.0]]);
-    assert_eq!(file.attributes.vertex_colors.unwrap()[2], [20, 0, 0, 255]);
+    // 20 of 255 in linear light is 79 in sRGB.
+    assert_eq!(file.attributes.vertex_colors.unwrap()[2], [79, 0, 0, 255]);
 }
 
 #[test]
@@ -133,6 +134,11 @@ fn attributes() -> (Mesh, Attributes) {
         corner_uvs: Some(vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [1.0, 0.0], [0.5, 0.25]]]),
         texture: Some(Texture::Embedded { bytes: b"\x89PNG and so on".to_vec(), mime: "image/png".into() }),
         vertex_scalars: vec![("distance".into(), vec![0.0, 1.0, 2.0, 3.5])],
+        vertex_integers: vec![IntegerField {
+            name: "label".into(),
+            kind: IntegerKind::I16,
+            values: vec![-1, 2, 300, 7],
+        }],
         skin: Some(skin),
     };
     (mesh, attributes)
@@ -283,4 +289,222 @@ fn what_glb_cannot_hold_is_an_error() {
     assert!(message(&far, &attributes).contains("vertex 0 is too far away"));
     attributes.skin.as_mut().unwrap().joints[1].frame = [[0.0; 4]; 4];
     assert!(message(&mesh, &attributes).contains("joint 1 is singular"));
+}
+
+/// The square with another primitive, whose attributes are in views behind the first 52 bytes.
+fn square_with(primitive: Value, views: &[(&[u8], Value)]) -> (Value, Vec<u8>) {
+    let (mut document, mut binary) = square();
+    document["meshes"][0]["primitives"] = json!([primitive]);
+    for (bytes, accessor) in views {
+        binary.resize(binary.len().next_multiple_of(4), 0);
+        let view = document["bufferViews"].as_array().unwrap().len();
+        let place = json!({"buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len()});
+        document["bufferViews"].as_array_mut().unwrap().push(place);
+        let mut accessor = accessor.clone();
+        accessor["bufferView"] = json!(view);
+        document["accessors"].as_array_mut().unwrap().push(accessor);
+        binary.extend(*bytes);
+    }
+    document["buffers"][0]["byteLength"] = json!(binary.len());
+    (document, binary)
+}
+
+fn shorts(values: &[u16]) -> Vec<u8> {
+    values.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+#[test]
+fn quantised_texture_coordinates_are_placed_by_the_extension() {
+    let uvs = shorts(&[0, 0, 4095, 0, 0, 4095, 4095, 4095]);
+    let primitive = json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "mode": 5, "material": 0});
+    for (normalized, scale) in [(false, 1.0 / 4095.0), (true, 65535.0 / 4095.0)] {
+        let accessor = json!({"componentType": 5123, "type": "VEC2", "count": 4, "normalized": normalized});
+        let (mut document, binary) = square_with(primitive.clone(), &[(&uvs, accessor)]);
+        let placed = json!({"KHR_texture_transform": {"scale": [scale, scale]}});
+        document["images"] = json!([{"bufferView": 2, "mimeType": "image/png"}]);
+        document["textures"] = json!([{"source": 0}]);
+        document["materials"] =
+            json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": placed}}}]);
+        document["extensionsRequired"] = json!(["KHR_mesh_quantization", "KHR_texture_transform"]);
+        let file = read_glb(&document, &binary).unwrap();
+        let corners = file.attributes.corner_uvs.unwrap()[0];
+        for (found, expected) in corners.as_flattened().iter().zip([0.0, 1.0, 1.0, 1.0, 0.0, 0.0]) {
+            assert!((found - expected).abs() < 1e-6, "{corners:?}");
+        }
+        assert_eq!(file.info.left_out, Vec::<String>::new());
+    }
+    // Integers without a scale are coordinates far outside of the image, as the file says.
+    let accessor = json!({"componentType": 5123, "type": "VEC2", "count": 4});
+    let (document, binary) = square_with(primitive, &[(&uvs, accessor)]);
+    let mut document = document;
+    document["materials"] = json!([{}]);
+    let file = read_glb(&document, &binary).unwrap();
+    assert_eq!(file.attributes.corner_uvs.unwrap()[0][1], [4095.0, 1.0]);
+}
+
+#[test]
+fn morph_targets_are_applied_with_the_weights_of_the_file() {
+    let primitive =
+        json!({"attributes": {"POSITION": 0}, "mode": 5, "targets": [{"POSITION": 0}, {"POSITION": 0}]});
+    let (mut document, binary) = square_with(primitive, &[]);
+    let last = |document: &Value| read_glb(document, &binary).unwrap().mesh.vertices()[3];
+    assert_eq!(last(&document), [1.0, 1.0, 0.0]);
+    document["meshes"][0]["weights"] = json!([1.0, 0.5]);
+    assert_eq!(last(&document), [2.5, 2.5, 0.0]);
+    document["nodes"][0]["weights"] = json!([0.0, 2.0]);
+    assert_eq!(last(&document), [3.0, 3.0, 0.0]);
+    let left_out = read_glb(&document, &binary).unwrap().info.left_out;
+    assert!(left_out[0].contains("2 morph targets"), "{left_out:?}");
+}
+
+#[test]
+fn instances_are_repeated_and_hidden_nodes_named() {
+    let moves = floats(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 10.0, 0.0, 0.0]);
+    let accessor = json!({"componentType": 5126, "type": "VEC3", "count": 3});
+    let (mut document, binary) =
+        square_with(json!({"attributes": {"POSITION": 0}, "mode": 5}), &[(&moves, accessor)]);
+    let listed = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}});
+    document["nodes"] =
+        json!([{"mesh": 0, "scale": [2.0, 2.0, 2.0], "extensions": listed}, {"mesh": 0, "name": "spare"}]);
+    document["scenes"] = json!([{"nodes": [0]}, {"nodes": [1]}]);
+    document["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    let file = read_glb(&document, &binary).unwrap();
+    assert_eq!((file.mesh.n_vertices(), file.mesh.n_faces()), (12, 6));
+    assert_eq!(file.mesh.vertices()[11], [22.0, 2.0, 0.0]);
+    let warnings = file.info.warnings.join("\n");
+    assert!(
+        warnings.contains("3 times") && warnings.contains("1 nodes") && warnings.contains("'spare'"),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn of_many_joints_the_strongest_four_are_kept_and_all_of_them_move_the_mesh() {
+    let joints = [[0u8, 1, 2, 3], [4, 5, 0, 0]].map(|set| set.repeat(4));
+    let weights = [[0.1f32, 0.2, 0.3, 0.15], [0.2, 0.05, 0.0, 0.0]].map(|set| floats(&set.repeat(4)));
+    let bytes = json!({"componentType": 5121, "type": "VEC4", "count": 4});
+    let numbers = json!({"componentType": 5126, "type": "VEC4", "count": 4});
+    let primitive = json!({"attributes":
+        {"POSITION": 0, "JOINTS_0": 2, "JOINTS_1": 3, "WEIGHTS_0": 4, "WEIGHTS_1": 5}, "mode": 5});
+    let views = [
+        (&joints[0][..], bytes.clone()),
+        (&joints[1], bytes),
+        (&weights[0], numbers.clone()),
+        (&weights[1], numbers),
+    ];
+    let (mut document, binary) = square_with(primitive, &views);
+    let joint = |i: usize| json!({"name": format!("j{i}"), "translation": [i, 0, 0]});
+    document["nodes"] =
+        json!([{"mesh": 0, "skin": 0}, joint(0), joint(1), joint(2), joint(3), joint(4), joint(5)]);
+    document["skins"] = json!([{"joints": [1, 2, 3, 4, 5, 6]}]);
+    let file = read_glb(&document, &binary).unwrap();
+    // 0.1 x 0 + 0.2 x 1 + 0.3 x 2 + 0.15 x 3 + 0.2 x 4 + 0.05 x 5
+    assert!((file.mesh.vertices()[0][0] - 2.3).abs() < 1e-6, "{:?}", file.mesh.vertices()[0]);
+    let skin = file.attributes.skin.unwrap();
+    assert_eq!(skin.indices[0], [2, 1, 4, 3]);
+    let expected = [0.3, 0.2, 0.2, 0.15].map(|w: f32| w / 0.85);
+    assert!(skin.weights[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{:?}", skin.weights[0]);
+    assert!(
+        file.info.left_out.iter().any(|what| what.contains("4 vertices' weaker joints")),
+        "{:?}",
+        file.info.left_out
+    );
+    document["nodes"][0] = json!({"mesh": 0});
+    let left_out = read_glb(&document, &binary).unwrap().info.left_out;
+    assert!(left_out[0].contains("whose node has no skin"), "{left_out:?}");
+}
+
+#[test]
+fn colors_of_materials_and_images_of_extensions() {
+    let uvs = floats(&[0.0; 8]);
+    let accessor = json!({"componentType": 5126, "type": "VEC2", "count": 4});
+    let primitive = json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "mode": 5, "material": 0});
+    let (mut document, binary) = square_with(primitive, &[(&uvs, accessor)]);
+    document["materials"] =
+        json!([{"pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.2158605, 0.0, 0.5]}}]);
+    let color = |document: &Value| read_glb(document, &binary).unwrap().attributes.vertex_colors.unwrap()[0];
+    assert_eq!(color(&document), [255, 128, 0, 128]);
+    document["materials"] = json!([{"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.0, 1.0, 0.0, 1.0]}}}]);
+    assert_eq!(color(&document), [0, 255, 0, 255]);
+    document["images"] = json!([{"bufferView": 2, "mimeType": "image/png"}]);
+    document["textures"] = json!([{"source": 0}]);
+    let glossy = json!({"diffuseTexture": {"index": 0}});
+    document["materials"] = json!([{"extensions": {"KHR_materials_pbrSpecularGlossiness": glossy}}]);
+    assert!(read_glb(&document, &binary).unwrap().attributes.texture.is_some());
+    document["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+    document["materials"][0]["normalTexture"] = json!({"index": 0});
+    document["extensionsUsed"] = json!(["EXT_texture_webp", "VRMC_vrm"]);
+    let file = read_glb(&document, &binary).unwrap();
+    let left_out = file.info.left_out.join("\n");
+    assert_eq!(file.attributes.texture, None);
+    for part in ["EXT_texture_webp", "the normal map", "'VRMC_vrm'"] {
+        assert!(left_out.contains(part), "{part}: {left_out}");
+    }
+}
+
+#[test]
+fn attributes_that_are_not_kept_are_named_and_integers_stay() {
+    let labels = shorts(&[7, 0, 300, 65535]);
+    let pairs = floats(&[0.0; 8]);
+    let short = json!({"componentType": 5123, "type": "SCALAR", "count": 4});
+    let pair = json!({"componentType": 5126, "type": "VEC2", "count": 4});
+    let attributes =
+        json!({"POSITION": 0, "_LABEL": 2, "_PAIR": 3, "TEXCOORD_0": 3, "TEXCOORD_1": 3, "COLOR_1": 0});
+    let (document, binary) =
+        square_with(json!({"attributes": attributes, "mode": 5}), &[(&labels, short), (&pairs, pair)]);
+    let file = read_glb(&document, &binary).unwrap();
+    let field = &file.attributes.vertex_integers[0];
+    assert_eq!((field.name.as_str(), field.kind), ("LABEL", IntegerKind::U16));
+    assert_eq!(field.values, [7, 0, 300, 65535]);
+    let left_out = file.info.left_out.join("\n");
+    for part in ["'_PAIR'", "TEXCOORD_1", "COLOR_1"] {
+        assert!(left_out.contains(part), "{part}: {left_out}");
+    }
+}
+
+#[test]
+fn compressed_data_without_a_plain_copy_is_refused_by_name() {
+    let (mut document, binary) = square();
+    let draco = json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}});
+    document["meshes"][0]["primitives"] =
+        json!([{"attributes": {"POSITION": 0}, "mode": 5, "extensions": draco}]);
+    assert!(read_glb(&document, &binary).is_ok());
+    document["accessors"][0] = json!({"componentType": 5126, "type": "VEC3", "count": 4});
+    let message = read_glb(&document, &binary).unwrap_err();
+    assert!(
+        message.contains("KHR_draco_mesh_compression") && message.contains("without compression"),
+        "{message}"
+    );
+    let (mut document, binary) = square();
+    let fallback = json!({"EXT_meshopt_compression": {"fallback": true}});
+    document["buffers"].as_array_mut().unwrap().push(json!({"byteLength": 48, "extensions": fallback}));
+    let message = read_glb(&document, &binary).unwrap_err();
+    assert!(message.contains("buffer 1") && message.contains("without compression"), "{message}");
+}
+
+#[test]
+fn a_mesh_far_from_the_origin_keeps_its_shape_and_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let (near, mut attributes) = attributes();
+    let at = [512_345.678, 5_412_345.678, 0.25];
+    let vertices = near.vertices().iter().map(|p| [p[0] + at[0], p[1] + at[1], p[2] + at[2]]).collect();
+    let far = Mesh::new(vertices, near.faces().to_vec()).unwrap();
+    for joint in &mut attributes.skin.as_mut().unwrap().joints {
+        (0..3).for_each(|axis| joint.frame[3][axis] += at[axis]);
+    }
+    for skin in [attributes.skin.clone(), None] {
+        write(&path, &far, &Attributes { skin, ..attributes.clone() }).unwrap();
+        let file = crate::io::read_mesh(&path).unwrap();
+        for (found, expected) in file.mesh.vertices().as_flattened().iter().zip(far.vertices().as_flattened())
+        {
+            assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+        }
+        for (found, wanted) in
+            file.attributes.skin.iter().flat_map(|s| &s.joints).zip(&attributes.skin.as_ref().unwrap().joints)
+        {
+            let pairs = found.frame.as_flattened().iter().zip(wanted.frame.as_flattened());
+            pairs.for_each(|(found, wanted)| assert!((found - wanted).abs() < 1e-5, "{found} {wanted}"));
+        }
+    }
 }

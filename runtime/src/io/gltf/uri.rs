@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::io::reference::{find_file, path_from_bytes};
+
 /// Where a URI points.
 #[derive(Debug, PartialEq)]
 pub(super) enum Target {
@@ -22,7 +24,10 @@ pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Target, String> {
     if let Some((scheme, _)) = uri.split_once(':').filter(|(scheme, _)| scheme.len() > 1) {
         return Err(format!("URIs of the kind '{}:' are not supported", scheme.escape_debug()));
     }
-    Ok(Target::File(folder.join(decode_percent(uri))))
+    // Names may be encoded or not, and be of another system.
+    let (decoded, plain) = (decode_percent(uri), uri.as_bytes());
+    let found = find_file(folder, &decoded).or_else(|| find_file(folder, plain));
+    Ok(Target::File(found.unwrap_or_else(|| folder.join(path_from_bytes(&decoded)))))
 }
 
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
@@ -56,7 +61,7 @@ fn decode_digit(c: u8) -> Option<u8> {
 }
 
 /// Replaces `%20` and the like; what is no such code stays.
-fn decode_percent(uri: &str) -> String {
+fn decode_percent(uri: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let Some((&c, tail)) = rest.split_first() {
@@ -75,13 +80,16 @@ fn decode_percent(uri: &str) -> String {
             }
         }
     }
-    String::from_utf8_lossy(&bytes).into_owned()
+    bytes
 }
 
 /// A file name as a URI.
-pub(super) fn encode_percent(name: &str) -> String {
+pub(super) fn encode_percent(name: &[u8]) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
-    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+    name.iter()
+        .copied()
+        .map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") })
+        .collect()
 }
 
 #[cfg(test)]
@@ -111,7 +119,9 @@ mod tests {
 
     #[test]
     fn percent_codes() {
-        assert_eq!(decode_percent("%C3%BC%2"), "\u{fc}%2");
-        assert_eq!(decode_percent(&encode_percent("a b/\u{fc}%.png")), "a b/\u{fc}%.png");
+        assert_eq!(decode_percent("%C3%BC%2"), "\u{fc}%2".as_bytes());
+        for name in ["a b/\u{fc}%.png".as_bytes(), b"k\xf6rper.png"] {
+            assert_eq!(decode_percent(&encode_percent(name)), name);
+        }
     }
 }

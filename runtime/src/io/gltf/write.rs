@@ -1,4 +1,5 @@
-//! Writing GLB: one mesh of one primitive, everything in the binary chunk.
+//! Writing GLB: one mesh of one primitive, everything in the binary chunk. Positions are in single precision, of a mesh far from the origin
+//! relative to its middle, which is then the place of its node.
 
 mod buffer;
 mod seams;
@@ -6,16 +7,21 @@ mod seams;
 use std::borrow::Cow;
 use std::path::Path;
 
-use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked::Valid;
 use gltf::json::{self, Index};
 
-use super::matrix4;
+use super::color;
+use super::matrix4::{self, Matrix4};
 use super::uri::encode_percent;
 use crate::Mesh;
 use crate::io::attributes::{Attributes, Skin, Texture};
+use crate::io::carried::GlbIntegers;
+use crate::io::reference::bytes_of_path;
+use crate::io::texture::{is_jpeg, is_png};
 use crate::io::{IoError, write_atomically};
+use crate::mesh::vec3;
 use buffer::{Buffer, Numbers};
 use seams::Split;
 
@@ -28,11 +34,12 @@ pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) ->
         return Err(unwritable(("glTF has no empty meshes".into(), "write a .ply or .off file")));
     }
     let image = match attributes.texture.as_ref().filter(|_| attributes.corner_uvs.is_some()) {
-        Some(texture) => Some(image(texture, path)?),
+        Some(texture) => image(texture, path)?,
         None => None,
     };
     let mut buffer = Buffer::default();
-    let primitive = primitive(&mut buffer, mesh, attributes).map_err(unwritable)?;
+    let place = far_place(mesh);
+    let primitive = primitive(&mut buffer, mesh, place, attributes).map_err(unwritable)?;
     let primitive = Primitive { material: Some(material(&mut buffer, image)), ..primitive };
     let mesh = buffer.root.push(json::Mesh {
         extensions: None,
@@ -41,11 +48,20 @@ pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) ->
         primitives: vec![primitive],
         weights: None,
     });
-    let node = buffer.root.push(json::Node { mesh: Some(mesh), ..Default::default() });
+    let translation = (place != [0.0; 3]).then(|| place.map(|x| x as f32));
+    let node = buffer.root.push(json::Node { mesh: Some(mesh), translation, ..Default::default() });
     let mut nodes = vec![node];
     if let Some(skin) = &attributes.skin {
-        let roots = skeleton(&mut buffer, skin, node).map_err(unwritable)?;
-        nodes.extend(roots);
+        let roots = skeleton(&mut buffer, skin, place, node).map_err(unwritable)?;
+        // The joints alone place a skinned mesh, so they are moved as it is.
+        match translation {
+            Some(_) => nodes.push(buffer.root.push(json::Node {
+                translation,
+                children: Some(roots),
+                ..Default::default()
+            })),
+            None => nodes.extend(roots),
+        }
     }
     let scene =
         buffer.root.push(json::Scene { extensions: None, extras: Default::default(), name: None, nodes });
@@ -54,10 +70,32 @@ pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) ->
     write_atomically(path, |w| w.write_all(&bytes))
 }
 
-fn primitive(buffer: &mut Buffer, mesh: &Mesh, attributes: &Attributes) -> Result<Primitive, Misfit> {
+/// On each axis along which the mesh is so far from the origin that single precision would show, a place near the middle of the mesh; else
+/// 0. It is a multiple of a power of two, so that its few decimals say it exactly to readers of either precision.
+fn far_place(mesh: &Mesh) -> [f64; 3] {
+    /// In diagonals of the mesh. At this distance coordinates are off by a millionth of the diagonal.
+    const FAR: f64 = 10.0;
+    let diagonal = mesh.diagonal();
+    let step = if diagonal > 0.0 { diagonal.log2().floor().exp2() } else { 1.0 };
+    [0, 1, 2].map(|axis| {
+        let coordinates = mesh.vertices().iter().map(|p| p[axis]);
+        let (low, high) =
+            coordinates.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let middle = f64::from(((0.5 * low + 0.5 * high) / step).round() as f32) * step;
+        let is_far = middle.abs() > FAR * diagonal && f64::from(middle as f32) == middle;
+        if is_far { middle } else { 0.0 }
+    })
+}
+
+fn primitive(
+    buffer: &mut Buffer,
+    mesh: &Mesh,
+    place: [f64; 3],
+    attributes: &Attributes,
+) -> Result<Primitive, Misfit> {
     let split = Split::at_seams(mesh, attributes.corner_uvs.as_deref());
-    let positions: Vec<[f32; 3]> =
-        split.vertices.iter().map(|&v| mesh.vertices()[v as usize].map(|x| x as f32)).collect();
+    let local = |v: u32| vec3::sub(mesh.vertices()[v as usize], place).map(|x| x as f32);
+    let positions: Vec<[f32; 3]> = split.vertices.iter().map(|&v| local(v)).collect();
     if let Some(vertex) = positions.iter().position(|p| p.iter().any(|x| x.is_infinite())) {
         let problem = format!("vertex {vertex} is too far away for single precision");
         return Err((problem, "scale the mesh or write a .ply file"));
@@ -65,9 +103,7 @@ fn primitive(buffer: &mut Buffer, mesh: &Mesh, attributes: &Attributes) -> Resul
     let mut list = vec![(Semantic::Positions, buffer.positions(&positions))];
     let floats = |components, normalized| Numbers { kind: ComponentType::F32, components, normalized };
     if let Some(colors) = &attributes.vertex_colors {
-        let bytes: Vec<u8> = split.vertices.iter().flat_map(|&v| colors[v as usize]).collect();
-        let numbers = Numbers { kind: ComponentType::U8, components: Type::Vec4, normalized: true };
-        list.push((Semantic::Colors(0), buffer.array(&bytes, numbers)));
+        list.push((Semantic::Colors(0), linear_colors(buffer, &split, colors)));
     }
     if attributes.corner_uvs.is_some() {
         let bytes: Vec<u8> =
@@ -92,8 +128,21 @@ fn primitive(buffer: &mut Buffer, mesh: &Mesh, attributes: &Attributes) -> Resul
         list.push((Semantic::Weights(0), buffer.array(&weights, floats(Type::Vec4, false))));
     }
     for (name, values) in &attributes.vertex_scalars {
-        let bytes: Vec<u8> = split.vertices.iter().flat_map(|&v| values[v as usize].to_le_bytes()).collect();
+        let bytes: Vec<u8> =
+            split.vertices.iter().flat_map(|&v| (values[v as usize] as f32).to_le_bytes()).collect();
         list.push((Semantic::Extras(name.clone()), buffer.array(&bytes, floats(Type::Scalar, false))));
+    }
+    for field in &attributes.vertex_integers {
+        let values = split.vertices.iter().map(|&v| field.values[v as usize]);
+        let accessor = match field.in_glb() {
+            Some(GlbIntegers::As(kind)) => buffer.integers(values, kind),
+            Some(GlbIntegers::Floats) => {
+                let bytes: Vec<u8> = values.flat_map(|x| (x as f32).to_le_bytes()).collect();
+                buffer.array(&bytes, floats(Type::Scalar, false))
+            }
+            None => continue,
+        };
+        list.push((Semantic::Extras(field.name.clone()), accessor));
     }
     let indices: Vec<u8> = split.faces.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
     Ok(Primitive {
@@ -107,36 +156,45 @@ fn primitive(buffer: &mut Buffer, mesh: &Mesh, attributes: &Attributes) -> Resul
     })
 }
 
+/// Adds colours: eight bits where they bring every colour back, else sixteen, since dark ones are close together in linear light.
+fn linear_colors(buffer: &mut Buffer, split: &Split, colors: &[[u8; 4]]) -> Index<Accessor> {
+    let is_fine = colors.iter().any(|c| !c[..3].iter().all(|&x| color::fits_a_byte(x)));
+    let components = Type::Vec4;
+    let rows = split.vertices.iter().map(|&v| {
+        let [r, g, b, a] = colors[v as usize];
+        [color::linear(r), color::linear(g), color::linear(b), f64::from(a) / 255.0]
+    });
+    if is_fine {
+        let bytes: Vec<u8> =
+            rows.flatten().flat_map(|x| ((65535.0 * x).round() as u16).to_le_bytes()).collect();
+        buffer.array(&bytes, Numbers { kind: ComponentType::U16, components, normalized: true })
+    } else {
+        let bytes: Vec<u8> = rows.flatten().map(|x| (255.0 * x).round() as u8).collect();
+        buffer.array(&bytes, Numbers { kind: ComponentType::U8, components, normalized: true })
+    }
+}
+
 /// An image to embed, or a reference to one.
 enum Image<'a> {
     Bytes(Cow<'a, [u8]>, &'static str),
     Uri(String),
 }
 
-/// The image's bytes where it is a PNG or JPEG file that can be read, else a reference.
-fn image<'a>(texture: &'a Texture, path: &Path) -> Result<Image<'a>, IoError> {
-    match texture {
-        Texture::Embedded { bytes, mime } => Ok(Image::Bytes(bytes.into(), mime_of(bytes, mime))),
-        Texture::File(file) => {
-            let bytes =
-                std::fs::metadata(file).ok().filter(|m| m.is_file()).and_then(|_| std::fs::read(file).ok());
-            match bytes.filter(|bytes| is_png(bytes) || is_jpeg(bytes)) {
-                Some(bytes) => {
-                    let mime = mime_of(&bytes, "");
-                    Ok(Image::Bytes(bytes.into(), mime))
-                }
-                None => Ok(Image::Uri(encode_percent(&texture.place_beside(path)?))),
-            }
+/// The image's bytes where it is a PNG or JPEG file that can be read, else a reference; `None` where there is no such file.
+fn image<'a>(texture: &'a Texture, path: &Path) -> Result<Option<Image<'a>>, IoError> {
+    let bytes: Cow<'a, [u8]> = match texture {
+        Texture::Embedded { bytes, .. } => bytes.into(),
+        Texture::File(file) if texture.exists() => {
+            std::fs::read(file).map_err(|source| IoError::Read { path: file.clone(), source })?.into()
         }
+        Texture::File(_) => return Ok(None),
+    };
+    if is_png(&bytes) || is_jpeg(&bytes) || matches!(texture, Texture::Embedded { .. }) {
+        let stated = if let Texture::Embedded { mime, .. } = texture { mime.as_str() } else { "" };
+        let mime = mime_of(&bytes, stated);
+        return Ok(Some(Image::Bytes(bytes, mime)));
     }
-}
-
-fn is_png(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"\x89PNG")
-}
-
-fn is_jpeg(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"\xFF\xD8\xFF")
+    Ok(texture.place_beside(path)?.map(|name| Image::Uri(encode_percent(&bytes_of_path(&name)))))
 }
 
 fn mime_of(bytes: &[u8], stated: &str) -> &'static str {
@@ -180,20 +238,26 @@ fn material(buffer: &mut Buffer, image: Option<Image<'_>>) -> Index<json::Materi
 fn skeleton(
     buffer: &mut Buffer,
     skin: &Skin,
+    place: [f64; 3],
     mesh: Index<json::Node>,
 ) -> Result<Vec<Index<json::Node>>, Misfit> {
+    let moved = |mut frame: Matrix4| {
+        (0..3).for_each(|axis| frame[3][axis] -= place[axis]);
+        frame
+    };
+    let frames: Vec<Matrix4> = skin.joints.iter().map(|joint| moved(joint.frame)).collect();
     let mut inverses = Vec::with_capacity(skin.joints.len());
-    for (i, joint) in skin.joints.iter().enumerate() {
+    for (i, frame) in frames.iter().enumerate() {
         let singular =
             || (format!("the frame of joint {i} is singular"), "give every joint a frame of full rank");
-        inverses.push(matrix4::inverse(&joint.frame).ok_or_else(singular)?);
+        inverses.push(matrix4::inverse(frame).ok_or_else(singular)?);
     }
     let first = buffer.root.nodes.len();
     let index = |joint: usize| Index::new((first + joint) as u32);
     let mut roots = Vec::new();
     for (i, joint) in skin.joints.iter().enumerate() {
         let parent = joint.parent.map(usize::from);
-        let local = parent.map_or(joint.frame, |parent| matrix4::product(&inverses[parent], &joint.frame));
+        let local = parent.map_or(frames[i], |parent| matrix4::product(&inverses[parent], &frames[i]));
         buffer.root.push(json::Node {
             matrix: Some(std::array::from_fn(|k| local[k / 4][k % 4] as f32)),
             name: Some(joint.name.clone()),

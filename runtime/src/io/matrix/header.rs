@@ -3,20 +3,70 @@
 use crate::io::error::{ParseError, Parsed, TRUNCATED};
 use crate::io::{Position, text::quote};
 
-const MAGIC: &[u8] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The element types that are read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::io) enum Kind {
+/// A type of the numbers in a `.npy` file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are NumPy's: kind and bytes")]
+pub enum NpyKind {
     F4,
     F8,
+    Bool,
+    I1,
+    U1,
+    I2,
+    U2,
     I4,
+    U4,
     I8,
+    U8,
+}
+
+impl NpyKind {
+    const ALL: [(Self, &'static str); 11] = [
+        (Self::F4, "f4"),
+        (Self::F8, "f8"),
+        (Self::Bool, "b1"),
+        (Self::I1, "i1"),
+        (Self::U1, "u1"),
+        (Self::I2, "i2"),
+        (Self::U2, "u2"),
+        (Self::I4, "i4"),
+        (Self::U4, "u4"),
+        (Self::I8, "i8"),
+        (Self::U8, "u8"),
+    ];
+
+    /// How many bytes a number takes.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Bool | Self::I1 | Self::U1 => 1,
+            Self::I2 | Self::U2 => 2,
+            Self::F4 | Self::I4 | Self::U4 => 4,
+            Self::F8 | Self::I8 | Self::U8 => 8,
+        }
+    }
+
+    /// Whether numbers of this type have values in between.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F4 | Self::F8)
+    }
+
+    /// What stands for no value where the type is of integers: -1, or without a sign 0.
+    pub fn missing(self) -> i64 {
+        if matches!(self, Self::I1 | Self::I2 | Self::I4 | Self::I8) { -1 } else { 0 }
+    }
+
+    /// NumPy's name of the type in the order of bytes that is written.
+    pub(super) fn descr(self) -> String {
+        let name = Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name);
+        format!("{}{name}", if self.size() == 1 { '|' } else { '<' })
+    }
 }
 
 #[derive(Debug)]
 pub(super) struct Header {
-    pub(super) kind: Kind,
+    pub(super) kind: NpyKind,
     pub(super) big_endian: bool,
     pub(super) fortran_order: bool,
     pub(super) rows: usize,
@@ -34,7 +84,7 @@ impl Header {
             let name = descr.split(", '").next().unwrap_or(descr);
             let problem =
                 format!("arrays of type {} are not supported", quote(name.trim_matches('\'').as_bytes()));
-            let remedy = "convert the array with NumPy's astype to float64, float32, int32 or int64";
+            let remedy = "convert the array with NumPy's astype to float64, float32 or a type of integers";
             ParseError::new(Position::Part("header".into()), problem, remedy)
         })?;
         let fortran_order = value("fortran_order")?.starts_with("True");
@@ -79,7 +129,7 @@ fn value<'a>(dictionary: &'a str, key: &str) -> Option<&'a str> {
     })
 }
 
-fn parse_descr(value: &str) -> Option<(Kind, bool)> {
+fn parse_descr(value: &str) -> Option<(NpyKind, bool)> {
     let quote = value.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
     let descr = value[1..].split(quote).next()?;
     let (order, kind) = descr.split_at_checked(1)?;
@@ -89,13 +139,7 @@ fn parse_descr(value: &str) -> Option<(Kind, bool)> {
         "=" => cfg!(target_endian = "big"),
         _ => return None,
     };
-    let kind = match kind {
-        "f4" => Kind::F4,
-        "f8" => Kind::F8,
-        "i4" => Kind::I4,
-        "i8" => Kind::I8,
-        _ => return None,
-    };
+    let (kind, _) = NpyKind::ALL.into_iter().find(|(_, name)| *name == kind)?;
     Some((kind, big_endian))
 }
 

@@ -95,3 +95,42 @@ fn errors_say_what_is_supported() {
     assert_eq!(decode::<i32>(&empty).unwrap().cols(), usize::MAX);
     assert!(message(&with_header("{}", &[])).contains("there is no 'descr'"));
 }
+
+#[test]
+fn integers_of_every_type_keep_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npy");
+    for (descr, kind, low, high) in [
+        ("|b1", NpyKind::Bool, 0, 1),
+        ("|i1", NpyKind::I1, -128, 127),
+        ("|u1", NpyKind::U1, 0, 255),
+        ("<i2", NpyKind::I2, -32768, 32767),
+        (">u2", NpyKind::U2, 0, 65535),
+        ("<i4", NpyKind::I4, -2_147_483_648, 2_147_483_647),
+        (">u4", NpyKind::U4, 0, 4_294_967_295i64),
+        ("<i8", NpyKind::I8, i64::MIN, i64::MAX),
+        ("<u8", NpyKind::U8, 0, i64::MAX),
+    ] {
+        let size = kind.size();
+        let mut body = Vec::new();
+        for value in [low, high] {
+            let mut bytes = value.to_le_bytes()[..size].to_vec();
+            if descr.starts_with('>') {
+                bytes.reverse();
+            }
+            body.extend(bytes);
+        }
+        let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (2,), }}");
+        std::fs::write(&path, with_header(&header, &body)).unwrap();
+        let expected = NpyArray::Integers(Matrix::from_vec(2, 1, vec![low, high]), kind);
+        assert_eq!(read_npy(&path).unwrap(), expected, "{descr}");
+        write_npy(&path, &expected).unwrap();
+        assert_eq!(read_npy(&path).unwrap(), expected, "{descr}");
+    }
+    let singles = NpyArray::Floats(Matrix::from_vec(1, 2, vec![0.5, f64::NEG_INFINITY]), NpyKind::F4);
+    write_npy(&path, &singles).unwrap();
+    assert_eq!(read_npy(&path).unwrap(), singles);
+    let large = with_header("{'descr': '<u8', 'fortran_order': False, 'shape': (1,), }", &[255; 8]);
+    std::fs::write(&path, large).unwrap();
+    assert!(read_npy(&path).unwrap_err().to_string().contains("does not fit"));
+}

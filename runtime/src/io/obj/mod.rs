@@ -1,4 +1,5 @@
-//! Wavefront OBJ: vertices in file order, with colours behind the coordinates; polygons with texture coordinates.
+//! Wavefront OBJ: vertices in file order, with colours behind the coordinates (or in `#MRGB` lines, as ZBrush writes them); polygons with
+//! texture coordinates.
 //!
 //! Parsed here: `tobj` renumbers the vertices of each object by first use and drops those that no face uses, but vertex `i` of
 //! the file must stay vertex `i`; and it panics on some material libraries.
@@ -12,7 +13,10 @@ use super::assemble::{MeshBuilder, colors_to_bytes};
 use super::attributes::MeshFile;
 use super::error::{ParseError, Parsed};
 use super::format::MeshFormat;
-use super::text::{Lines, Words, float, quote};
+use super::text::{Lines, Words, float, quote, without_comment};
+
+/// As many names of groups and objects are told apart.
+const MAX_GROUPS: usize = 256;
 
 pub(super) use write::write;
 
@@ -56,11 +60,19 @@ struct Reader {
     colors: Vec<[f32; 4]>,
     /// Whether all colours have an alpha.
     alpha: bool,
+    /// Colours of `#MRGB` lines.
+    painted: Vec<[u8; 4]>,
     uvs: Vec<[f32; 2]>,
     /// The line of each triangle, for the check of its indices when all vertices are known.
     lines: Vec<u32>,
     libraries: Vec<Vec<u8>>,
     materials: Vec<Vec<u8>>,
+    /// For each run of triangles of one material the first one, and the material.
+    runs: Vec<(usize, usize)>,
+    group: Vec<u8>,
+    n_weights: usize,
+    n_without_area: usize,
+    n_curved: usize,
     corners: Vec<u32>,
     corner_uvs: Vec<[f32; 2]>,
 }
@@ -71,44 +83,67 @@ impl Reader {
             builder: MeshBuilder::new(MeshFormat::Obj),
             colors: Vec::new(),
             alpha: true,
+            painted: Vec::new(),
             uvs: Vec::new(),
             lines: Vec::new(),
             libraries: Vec::new(),
             materials: Vec::new(),
+            runs: Vec::new(),
+            group: Vec::new(),
+            n_weights: 0,
+            n_without_area: 0,
+            n_curved: 0,
             corners: Vec::new(),
             corner_uvs: Vec::new(),
         }
     }
 
     fn line(&mut self, line: &[u8], number: usize) -> Parsed<()> {
-        let line = match line.iter().position(|&b| b == b'#') {
-            Some(comment) => &line[..comment],
-            None => line,
-        };
-        let mut words = Words::new(line, number);
+        // Names may hold a '#', so their lines are taken whole.
+        let whole = Words::new(line, number);
+        let mut words = Words::new(without_comment(line), number);
         match words.next().unwrap_or_default() {
-            b"v" => self.vertex(words),
+            b"" => self.comment(line),
+            b"v" => self.vertex(words)?,
             b"vt" => {
                 let u = words.finite("a texture coordinate")? as f32;
-                let v = words.next().and_then(float).unwrap_or(0.0) as f32;
+                let v = if words.clone().next().is_some() {
+                    words.finite("a texture coordinate")? as f32
+                } else {
+                    0.0
+                };
                 self.uvs.push([u, v]);
-                Ok(())
             }
-            b"f" | b"fo" => self.face(words, number),
-            b"mtllib" => {
-                self.libraries.push(words.rest().trim_ascii().to_vec());
-                Ok(())
-            }
-            b"usemtl" => {
-                let name = words.rest().trim_ascii();
-                if self.materials.last().is_none_or(|last| last != name) {
-                    self.materials.push(name.to_vec());
-                }
-                Ok(())
-            }
-            // Normals, groups, lines, curves and whatever else there may be.
-            _ => Ok(()),
+            b"f" | b"fo" => self.face(words, number)?,
+            b"mtllib" => self.libraries.push(name(whole)),
+            b"usemtl" => self.material(name(whole)),
+            b"g" | b"o" => self.group = name(whole),
+            b"l" | b"p" => self.n_without_area += 1,
+            b"curv" | b"curv2" | b"surf" => self.n_curved += 1,
+            // Normals, smoothing and whatever else there may be.
+            _ => {}
         }
+        Ok(())
+    }
+
+    fn material(&mut self, name: Vec<u8>) {
+        let known = self.materials.iter().rposition(|other| *other == name);
+        let material = known.unwrap_or_else(|| {
+            self.materials.push(name);
+            self.materials.len() - 1
+        });
+        self.runs.push((self.builder.faces.len(), material));
+    }
+
+    /// Takes the colours of `#MRGB` and eight hexadecimal digits for each vertex: mask, red, green, blue.
+    fn comment(&mut self, line: &[u8]) {
+        let Some(digits) = line.trim_ascii().strip_prefix(b"#MRGB") else { return };
+        let parse = |group: &[u8]| u32::from_str_radix(std::str::from_utf8(group).ok()?, 16).ok();
+        let colors = digits.trim_ascii().chunks_exact(8).map_while(parse);
+        self.painted.extend(colors.map(|c| {
+            let [_, r, g, b] = c.to_be_bytes();
+            [r, g, b, 255]
+        }));
     }
 
     /// `v x y z [w]`, `v x y z r g b` or `v x y z r g b a`.
@@ -130,6 +165,8 @@ impl Reader {
             self.colors.resize(self.builder.vertices.len() - 1, [1.0; 4]);
             self.colors.push(rest);
             self.alpha &= n == 4;
+        } else if n > 0 && rest[0] != 1.0 {
+            self.n_weights += 1;
         }
         Ok(())
     }
@@ -156,6 +193,13 @@ impl Reader {
         self.builder
             .polygon_with_uvs(&self.corners, Some(self.corner_uvs.as_slice()).filter(|uvs| !uvs.is_empty()));
         self.lines.resize(self.builder.faces.len(), number as u32);
+        if !self.group.is_empty() {
+            let (group, groups) = (std::mem::take(&mut self.group), &mut self.builder.info.groups);
+            let group = String::from_utf8_lossy(&group).into_owned();
+            if groups.len() < MAX_GROUPS && !groups.contains(&group) {
+                groups.push(group);
+            }
+        }
         Ok(())
     }
 
@@ -169,17 +213,62 @@ impl Reader {
                 return Err(no_such(&Words::new(b"", line as usize), "vertex", i64::from(vertex) + 1, n));
             }
         }
+        self.vertex_colors(n);
+        self.materials(folder);
+        let info = &mut self.builder.info;
+        if self.n_weights > 0 {
+            info.warnings.push(format!(
+                "{} vertices have a weight other than 1, which is not applied",
+                self.n_weights
+            ));
+        }
+        if self.n_curved > 0 {
+            info.warnings.push(format!("{} curves and curved surfaces were left out", self.n_curved));
+        }
+        if self.n_without_area > 0 {
+            info.left_out.push(format!("{} lines and points ('l' and 'p')", self.n_without_area));
+        }
+        self.builder.finish()
+    }
+
+    fn vertex_colors(&mut self, n: usize) {
         if !self.colors.is_empty() {
             self.colors.resize(n, [1.0; 4]);
             self.builder.attributes.vertex_colors = Some(colors_to_bytes(&self.colors, self.alpha));
         }
-        if !self.builder.corner_uvs.is_empty() {
-            let texture =
-                material::texture(&self.libraries, &self.materials, folder, &mut self.builder.info.warnings);
-            self.builder.attributes.texture = texture;
+        match self.painted.len() {
+            0 => {}
+            painted if painted == n && self.colors.is_empty() => {
+                self.builder.attributes.vertex_colors = Some(std::mem::take(&mut self.painted));
+            }
+            painted => {
+                let left_out = format!("{painted} colours of '#MRGB' lines, where there are {n} vertices");
+                self.builder.info.left_out.push(left_out);
+            }
         }
-        self.builder.finish()
     }
+
+    /// Takes from the materials in use the image that the texture coordinates refer to, or without images the colours.
+    fn materials(&mut self, folder: &Path) {
+        if self.materials.is_empty() {
+            return;
+        }
+        let has_uvs = !self.builder.corner_uvs.is_empty();
+        let found = material::find(&self.libraries, &self.materials, folder, &mut self.builder.info);
+        let has_image = found.iter().flatten().any(|material| material.has_image());
+        if has_uvs && has_image {
+            let image_of = material::texture(&found, &mut self.builder);
+            material::count_other_images(&image_of, &self.runs, &mut self.builder);
+        } else if self.builder.attributes.vertex_colors.is_none() && !has_image {
+            material::spread_colors(&found, &self.runs, &mut self.builder);
+        }
+    }
+}
+
+/// What follows the keyword, as it is.
+fn name(mut line: Words<'_>) -> Vec<u8> {
+    line.next();
+    line.rest().trim_ascii().to_vec()
 }
 
 /// Splits `v`, `v/vt`, `v//vn` or `v/vt/vn` into the indices of vertex and texture coordinate, as written.

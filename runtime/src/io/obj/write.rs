@@ -6,27 +6,29 @@ use std::path::Path;
 
 use crate::Mesh;
 use crate::io::attributes::Attributes;
+use crate::io::reference::bytes_of_path;
 use crate::io::{IoError, write_atomically};
 
 pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
-    let library = match &attributes.texture {
-        Some(texture) if attributes.corner_uvs.is_some() => {
-            let image = texture.place_beside(path)?;
-            let library = path.with_extension("mtl");
-            write_atomically(&library, |w| {
-                writeln!(w, "newmtl surface\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {image}")
-            })?;
-            Some(library.file_name().unwrap_or_default().to_string_lossy().into_owned())
-        }
-        _ => None,
-    };
+    let texture = attributes.texture.as_ref().filter(|_| attributes.corner_uvs.is_some());
+    let image = texture.map(|texture| texture.place_beside(path)).transpose()?.flatten();
+    let library = image.is_some().then(|| path.with_extension("mtl"));
+    if let (Some(image), Some(library)) = (&image, &library) {
+        write_atomically(library, |w| {
+            write!(w, "newmtl surface\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd ")?;
+            w.write_all(&bytes_of_path(image))?;
+            writeln!(w)
+        })?;
+    }
     write_atomically(path, |w| {
-        if let Some(library) = library {
-            writeln!(w, "mtllib {library}")?;
+        if let Some(name) = library.as_deref().and_then(Path::file_name) {
+            w.write_all(b"mtllib ")?;
+            w.write_all(&bytes_of_path(Path::new(name)))?;
+            writeln!(w)?;
         }
         write_vertices(w, mesh, attributes)?;
         match &attributes.corner_uvs {
-            Some(uvs) => write_textured_faces(w, mesh, uvs, attributes.texture.is_some()),
+            Some(uvs) => write_textured_faces(w, mesh, uvs, image.is_some()),
             None => {
                 mesh.faces().iter().try_for_each(|[a, b, c]| writeln!(w, "f {} {} {}", a + 1, b + 1, c + 1))
             }

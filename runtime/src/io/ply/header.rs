@@ -1,5 +1,6 @@
 //! The header: which elements follow, how many of each, and the properties of one.
 
+use crate::io::attributes::IntegerKind;
 use crate::io::error::{ParseError, Parsed, Position, TRUNCATED};
 use crate::io::text::{Words, quote};
 
@@ -48,8 +49,8 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// The file named by a `TextureFile` comment.
-    pub(super) texture: Option<String>,
+    /// The files named by `TextureFile` comments.
+    pub(super) textures: Vec<Vec<u8>>,
     /// Where the values begin, in bytes.
     pub(super) body: usize,
     /// How many lines the header has.
@@ -80,7 +81,20 @@ impl Number {
         }
     }
 
-    fn is_float(self) -> bool {
+    /// The type of a field of such integers.
+    pub(super) fn integer_kind(self) -> Option<IntegerKind> {
+        Some(match self {
+            Self::I8 => IntegerKind::I8,
+            Self::U8 => IntegerKind::U8,
+            Self::I16 => IntegerKind::I16,
+            Self::U16 => IntegerKind::U16,
+            Self::I32 => IntegerKind::I32,
+            Self::U32 => IntegerKind::U32,
+            Self::F32 | Self::F64 => return None,
+        })
+    }
+
+    pub(super) fn is_float(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
 }
@@ -88,18 +102,18 @@ impl Number {
 impl Header {
     pub(super) fn parse(bytes: &[u8]) -> Parsed<Self> {
         let mut lines = HeaderLines { bytes, at: 0, number: 0 };
-        if lines.next()?.next() != Some(b"ply") {
+        if !lines.next()?.next().is_some_and(|word| word.eq_ignore_ascii_case(b"ply")) {
             return Err(ParseError::line(1, "the file does not begin with 'ply'"));
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
-        let mut texture = None;
+        let mut textures = Vec::new();
         loop {
             let mut words = lines.next()?;
             match words.next().unwrap_or_default() {
                 b"end_header" => break,
                 b"format" => encoding = Some(parse_encoding(&mut words)?),
-                b"comment" => texture = texture.or_else(|| texture_file(&mut words)),
+                b"comment" => textures.extend(texture_file(&mut words)),
                 b"element" => {
                     let element = parse_element(&mut words)?;
                     if elements.iter().any(|e| e.name == element.name) {
@@ -120,7 +134,7 @@ impl Header {
         }
         let encoding =
             encoding.ok_or_else(|| ParseError::line(lines.number, "the header has no 'format' line"))?;
-        Ok(Self { encoding, elements, texture, body: lines.at, n_lines: lines.number })
+        Ok(Self { encoding, elements, textures, body: lines.at, n_lines: lines.number })
     }
 }
 
@@ -136,8 +150,8 @@ fn parse_encoding(words: &mut Words<'_>) -> Parsed<Encoding> {
     }
 }
 
-fn texture_file(words: &mut Words<'_>) -> Option<String> {
-    (words.next()? == b"TextureFile").then(|| String::from_utf8_lossy(words.rest().trim_ascii()).into_owned())
+fn texture_file(words: &mut Words<'_>) -> Option<Vec<u8>> {
+    words.next()?.eq_ignore_ascii_case(b"TextureFile").then(|| words.rest().trim_ascii().to_vec())
 }
 
 fn parse_element(words: &mut Words<'_>) -> Parsed<Element> {

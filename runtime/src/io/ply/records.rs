@@ -1,5 +1,6 @@
 //! The records of the elements: vertices, faces, triangle strips.
 
+use super::columns::{self, Colors, Field};
 use super::header::{Element, Kind, Number, Property};
 use super::source::Source;
 use crate::io::assemble::{MeshBuilder, strip_triangles};
@@ -14,26 +15,37 @@ enum Slot {
     Skip,
 }
 
-impl Slot {
-    fn of(property: &Property, fields: &mut Vec<(String, Vec<f32>)>) -> Self {
-        let Kind::Scalar(kind) = property.kind else { return Self::Skip };
+/// The slot of each property. Lists are noted as left out, normals passed over.
+fn slots(
+    element: &Element,
+    colors: Option<&Colors>,
+    uvs: Option<[usize; 2]>,
+    fields: &mut Vec<Field>,
+    left_out: &mut Vec<String>,
+) -> Vec<Slot> {
+    let slot = |(i, property): (usize, &Property)| {
+        let Kind::Scalar(kind) = property.kind else {
+            left_out.push(format!("the list '{}' of the vertices", property.name));
+            return Slot::Skip;
+        };
+        if let Some(channel) = colors.and_then(|c| c.at.iter().position(|at| *at == Some(i))) {
+            return Slot::Color(channel, kind);
+        }
+        if let Some(axis) = uvs.and_then(|uvs| uvs.iter().position(|at| *at == i)) {
+            return Slot::Uv(axis);
+        }
         match property.name.as_str() {
-            "x" => Self::Coordinate(0),
-            "y" => Self::Coordinate(1),
-            "z" => Self::Coordinate(2),
-            "red" | "r" | "diffuse_red" => Self::Color(0, kind),
-            "green" | "g" | "diffuse_green" => Self::Color(1, kind),
-            "blue" | "b" | "diffuse_blue" => Self::Color(2, kind),
-            "alpha" | "a" | "diffuse_alpha" => Self::Color(3, kind),
-            "u" | "s" | "texture_u" | "texture_s" => Self::Uv(0),
-            "v" | "t" | "texture_v" | "texture_t" => Self::Uv(1),
-            "nx" | "ny" | "nz" => Self::Skip,
+            "x" => Slot::Coordinate(0),
+            "y" => Slot::Coordinate(1),
+            "z" => Slot::Coordinate(2),
+            "nx" | "ny" | "nz" => Slot::Skip,
             name => {
-                fields.push((name.to_owned(), Vec::new()));
-                Self::Field(fields.len() - 1)
+                fields.push(Field { name: name.to_owned(), kind: kind.integer_kind(), values: Vec::new() });
+                Slot::Field(fields.len() - 1)
             }
         }
-    }
+    };
+    element.properties.iter().enumerate().map(slot).collect()
 }
 
 /// Reads the vertices and their attributes; returns the texture coordinates, if there are any.
@@ -42,15 +54,13 @@ pub(super) fn read_vertices<S: Source>(
     element: &Element,
     builder: &mut MeshBuilder,
 ) -> Parsed<Vec<[f32; 2]>> {
-    let mut fields = Vec::new();
-    let slots: Vec<Slot> = element.properties.iter().map(|p| Slot::of(p, &mut fields)).collect();
+    let (mut fields, mut colors, has_uv) = (Vec::new(), Colors::of(element), columns::uvs(element));
+    let slots = slots(element, colors.as_ref(), has_uv, &mut fields, &mut builder.info.left_out);
     check_coordinates(&slots)?;
-    let has_color = slots.iter().any(|slot| matches!(slot, Slot::Color(..)));
-    let has_uv = slots.iter().any(|slot| matches!(slot, Slot::Uv(_)));
-    let (mut colors, mut uvs) = (Vec::new(), Vec::new());
+    let mut uvs = Vec::new();
     builder.vertices.reserve_exact(element.count);
     for vertex in 0..element.count {
-        let (mut position, mut color, mut uv) = ([0.0; 3], [0, 0, 0, 255], [0.0; 2]);
+        let (mut position, mut color, mut uv) = ([0.0; 3], [0.0; 4], [0.0; 2]);
         for (property, slot) in element.properties.iter().zip(&slots) {
             let (Kind::Scalar(kind), false) = (property.kind, matches!(slot, Slot::Skip)) else {
                 source.skip_property(property).map_err(|e| e.within(place(element, vertex)))?;
@@ -59,9 +69,9 @@ pub(super) fn read_vertices<S: Source>(
             let value = source.number(kind).map_err(|e| e.within(place(element, vertex)))?;
             match slot {
                 Slot::Coordinate(axis) => position[*axis] = value,
-                Slot::Color(channel, kind) => color[*channel] = color_byte(value, *kind),
+                Slot::Color(channel, kind) => color[*channel] = Colors::value(value, *kind),
                 Slot::Uv(axis) => uv[*axis] = value as f32,
-                Slot::Field(field) => fields[*field].1.push(value as f32),
+                Slot::Field(field) => fields[*field].values.push(value),
                 Slot::Skip => {}
             }
         }
@@ -70,11 +80,18 @@ pub(super) fn read_vertices<S: Source>(
             return Err(source.error(problem).within(place(element, vertex)));
         }
         builder.vertices.push(position);
-        colors.extend(has_color.then_some(color));
-        uvs.extend(has_uv.then_some(uv));
+        if let Some(colors) = &mut colors {
+            colors.values.push(color);
+        }
+        uvs.extend(has_uv.is_some().then_some(uv));
     }
-    builder.attributes.vertex_colors = has_color.then_some(colors);
-    builder.attributes.vertex_scalars = fields;
+    builder.attributes.vertex_colors = colors.map(|colors| colors.to_bytes());
+    for field in fields {
+        match field.into_integers() {
+            Ok(field) => builder.attributes.vertex_integers.push(field),
+            Err(scalars) => builder.attributes.vertex_scalars.push(scalars),
+        }
+    }
     Ok(uvs)
 }
 
@@ -91,14 +108,27 @@ fn check_coordinates(slots: &[Slot]) -> Parsed<()> {
     }
 }
 
-/// Integer colours count to 255 (16-bit ones to 65535), floating-point ones to 1.
-fn color_byte(value: f64, kind: Number) -> u8 {
-    let scaled = match kind {
-        Number::F32 | Number::F64 => value * 255.0,
-        Number::U16 | Number::I16 => value / 257.0,
-        _ => value,
-    };
-    scaled.round() as u8
+/// What the faces carry besides corners and their texture coordinates.
+#[derive(Default)]
+pub(super) struct FaceColumns {
+    colors: Option<Colors>,
+    /// The number of each face's image.
+    images: Vec<u32>,
+    /// The face that each triangle is of; empty where nothing is carried.
+    face_of_triangle: Vec<u32>,
+}
+
+impl FaceColumns {
+    /// Gives the colours to the vertices; returns the number of each triangle's image.
+    pub(super) fn finish(self, builder: &mut MeshBuilder) -> Vec<u32> {
+        if let Some(colors) = self.colors {
+            let bytes = colors.to_bytes();
+            let of_triangle = |&face: &u32| bytes.get(face as usize).copied();
+            let of_face: Vec<Option<[u8; 4]>> = self.face_of_triangle.iter().map(of_triangle).collect();
+            builder.spread_face_colors(&of_face, "faces");
+        }
+        self.face_of_triangle.iter().filter_map(|&face| self.images.get(face as usize).copied()).collect()
+    }
 }
 
 /// Reads polygons and, where there is a list `texcoord`, the texture coordinates of their corners.
@@ -107,14 +137,28 @@ pub(super) fn read_faces<S: Source>(
     element: &Element,
     n_vertices: usize,
     builder: &mut MeshBuilder,
-) -> Parsed<()> {
+) -> Parsed<FaceColumns> {
     let (mut items, mut corners, mut uvs) = (Vec::new(), Vec::new(), Vec::new());
+    let mut faces = FaceColumns { colors: Colors::of(element), ..Default::default() };
+    let image = columns::scalar(element, "texnumber").map(|(i, _)| i);
+    let colors_at = faces.colors.as_ref().map_or([None; 4], |colors| colors.at);
+    let carried = |i: usize| image == Some(i) || colors_at.contains(&Some(i));
+    for (i, property) in element.properties.iter().enumerate() {
+        let known = matches!(
+            property.name.as_str(),
+            "vertex_indices" | "vertex_index" | "texcoord" | "nx" | "ny" | "nz"
+        );
+        if !known && !carried(i) {
+            builder.info.left_out.push(format!("the property '{}' of the faces", property.name));
+        }
+    }
     // A face takes at least 4 bytes in any encoding of a triangle mesh; others only make the vector grow.
     builder.faces.reserve(element.count.min(source.remaining() / 4));
     for face in 0..element.count {
         corners.clear();
         uvs.clear();
-        for property in &element.properties {
+        let mut color = [0.0; 4];
+        for (i, property) in element.properties.iter().enumerate() {
             let read = match (property.name.as_str(), property.kind) {
                 ("vertex_indices" | "vertex_index", Kind::List { length, item }) => source
                     .list(length, item, &mut items)
@@ -124,13 +168,25 @@ pub(super) fn read_faces<S: Source>(
                         uvs.extend(items.chunks_exact(2).map(|uv| [uv[0] as f32, uv[1] as f32]));
                     })
                 }
+                (_, Kind::Scalar(kind)) if carried(i) => {
+                    source.number(kind).map(|value| match colors_at.iter().position(|at| *at == Some(i)) {
+                        Some(channel) => color[channel] = Colors::value(value, kind),
+                        None => faces.images.push(value as u32),
+                    })
+                }
                 _ => source.skip_property(property),
             };
             read.map_err(|e| e.within(place(element, face)))?;
         }
         builder.polygon_with_uvs(&corners, Some(uvs.as_slice()).filter(|uvs| !uvs.is_empty()));
+        if let Some(colors) = &mut faces.colors {
+            colors.values.push(color);
+        }
+        if faces.colors.is_some() || image.is_some() {
+            faces.face_of_triangle.resize(builder.faces.len(), face as u32);
+        }
     }
-    Ok(())
+    Ok(faces)
 }
 
 /// Reads triangle strips: vertex indices, with -1 between two strips.

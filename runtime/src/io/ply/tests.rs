@@ -1,6 +1,6 @@
 use super::*;
 use crate::Mesh;
-use crate::io::attributes::Attributes;
+use crate::io::attributes::{Attributes, IntegerKind};
 
 fn message(bytes: &[u8]) -> String {
     read(bytes, Path::new("")).unwrap_err().in_file(Path::new("a.ply")).to_string()
@@ -64,7 +64,15 @@ fn text_and_both_byte_orders_agree() {
     assert_eq!(attributes.vertex_scalars[0].0, "quality");
     assert_eq!(attributes.vertex_scalars[0].1[1], 1.5);
     assert!(attributes.vertex_scalars[0].1[2].is_nan());
-    assert_eq!(attributes.texture, Some(Texture::File("folder/my skin.png".into())));
+    let left_out = text.info.left_out.join("\n");
+    for name in [
+        "'my skin.png', since there are no texture coordinates",
+        "'neighbours'",
+        "1 records of 'camera'",
+        "'flags'",
+    ] {
+        assert!(left_out.contains(name), "{name}: {left_out}");
+    }
     for little in [true, false] {
         let binary = read(&binary_of_text(little), Path::new("folder")).unwrap();
         assert_eq!(binary.mesh, text.mesh);
@@ -98,6 +106,86 @@ fn triangle_strips_and_float_colors() {
         file.attributes.vertex_colors.unwrap(),
         [[255, 0, 0, 255], [0, 128, 0, 255], [0, 0, 0, 255], [255, 0, 0, 255]]
     );
+}
+
+/// Text of one vertex for each row, with properties behind the position.
+fn with_properties(properties: &str, rows: &[&str]) -> MeshFile {
+    let body: String = rows.iter().map(|row| format!("0 0 0 {row}\n")).collect();
+    let header = "property float x\nproperty float y\nproperty float z\n";
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n{header}{properties}end_header\n{body}",
+        rows.len()
+    );
+    read(text.as_bytes(), Path::new("")).unwrap()
+}
+
+#[test]
+fn colors_of_every_type_range_and_order() {
+    let rgb = |kind: &str| format!("property {kind} red\nproperty {kind} green\nproperty {kind} blue\n");
+    for (properties, row, expected) in [
+        (rgb("uchar"), "255 128 1", [255, 128, 1, 255]),
+        (rgb("float"), "1 0.5 0", [255, 128, 0, 255]),
+        (rgb("float"), "255 128 1", [255, 128, 1, 255]),
+        (rgb("double"), "65535 32768 0", [255, 128, 0, 255]),
+        (rgb("ushort"), "65535 32896 257", [255, 128, 1, 255]),
+        (rgb("ushort"), "255 128 1", [255, 128, 1, 255]),
+        (rgb("int"), "255 128 1", [255, 128, 1, 255]),
+        (rgb("char"), "-1 -128 1", [255, 128, 1, 255]),
+        (
+            "property uchar blue\nproperty uchar alpha\nproperty uchar red\nproperty uchar green\n".into(),
+            "1 9 255 128",
+            [255, 128, 1, 9],
+        ),
+        (
+            "property float r\nproperty float g\nproperty float b\nproperty float a\n".into(),
+            "255 128 1 1",
+            [255, 128, 1, 255],
+        ),
+    ] {
+        let file = with_properties(&properties, &[row]);
+        assert_eq!(file.attributes.vertex_colors.unwrap(), [expected], "{properties}");
+        assert_eq!(file.attributes.vertex_scalars.len() + file.attributes.vertex_integers.len(), 0);
+    }
+    // A single letter alone is a field like any other.
+    let file = with_properties("property float r\nproperty float u\n", &["7 8"]);
+    assert_eq!(file.attributes.vertex_colors, None);
+    assert_eq!(file.attributes.vertex_scalars, [("r".into(), vec![7.0]), ("u".into(), vec![8.0])]);
+}
+
+#[test]
+fn integers_stay_integers_and_doubles_double() {
+    let properties = "property int label\nproperty double time\nproperty uchar odd\n";
+    let file = with_properties(properties, &["16777217 1700000000.25 1", "-5 nan 1.5"]);
+    let field = &file.attributes.vertex_integers[0];
+    assert_eq!((field.name.as_str(), field.kind), ("label", IntegerKind::I32));
+    assert_eq!(field.values, [16_777_217, -5]);
+    assert_eq!(file.attributes.vertex_scalars[0].1[0], 1_700_000_000.25);
+    assert_eq!(file.attributes.vertex_scalars[1], ("odd".into(), vec![1.0, 1.5]));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    write(&path, &file.mesh, &file.attributes).unwrap();
+    let header = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
+    assert!(header.contains("property int label") && header.contains("property double time"), "{header}");
+    let again = crate::io::read_mesh(&path).unwrap();
+    assert_eq!(again.attributes.vertex_integers, file.attributes.vertex_integers);
+    assert_eq!(again.attributes.vertex_scalars[0].1[0], 1_700_000_000.25);
+}
+
+#[test]
+fn colors_and_images_of_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("b.png"), "").unwrap();
+    let text = "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 4\nproperty float x\n\
+        property float y\nproperty float z\nelement face 3\nproperty list uchar int vertex_indices\n\
+        property list uchar float texcoord\nproperty int texnumber\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+        end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 6 0 0 1 0 0 1 1 200 0 0\n4 1 3 2 0 8 0 0 1 0 0 1 1 1 1 0 100 0\n\
+        3 0 1 2 6 0 0 1 0 0 1 0 200 0 0\n";
+    let file = read(text.as_bytes(), folder.path()).unwrap();
+    // Most triangles refer to the second image.
+    assert_eq!(file.attributes.texture, Some(Texture::File(folder.path().join("b.png"))));
+    let left_out = file.info.left_out.join("\n");
+    assert!(left_out.contains("'a.png'") && left_out.contains("1 triangles"), "{left_out}");
+    assert_eq!(file.attributes.vertex_colors.unwrap()[3], [0, 100, 0, 255]);
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use std::collections::HashSet;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::Mesh;
-use crate::io::attributes::{Attributes, Texture};
+use crate::io::attributes::{Attributes, IntegerKind};
+use crate::io::reference::bytes_of_path;
 use crate::io::{IoError, write_atomically};
 
 /// Property names with a meaning of their own, which no scalar field may take.
@@ -41,7 +42,7 @@ const RESERVED: [&str; 27] = [
 
 pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
     let texture = attributes.texture.as_ref().filter(|_| attributes.corner_uvs.is_some());
-    let texture = texture.map(|texture| texture.place_beside(path)).transpose()?;
+    let texture = texture.map(|texture| texture.place_beside(path)).transpose()?.flatten();
     write_atomically(path, |w| {
         let single = mesh.vertices().iter().flatten().all(|&x| f64::from(x as f32) == x);
         write_header(w, mesh, attributes, texture.as_deref(), single)?;
@@ -54,12 +55,14 @@ fn write_header(
     w: &mut dyn Write,
     mesh: &Mesh,
     attributes: &Attributes,
-    texture: Option<&str>,
+    texture: Option<&Path>,
     single: bool,
 ) -> io::Result<()> {
     writeln!(w, "ply\nformat binary_little_endian 1.0")?;
     if let Some(name) = texture {
-        writeln!(w, "comment TextureFile {name}")?;
+        w.write_all(b"comment TextureFile ")?;
+        w.write_all(&bytes_of_path(name))?;
+        writeln!(w)?;
     }
     writeln!(w, "element vertex {}", mesh.n_vertices())?;
     let number = if single { "float" } else { "double" };
@@ -67,8 +70,8 @@ fn write_header(
     if attributes.vertex_colors.is_some() {
         ["red", "green", "blue", "alpha"].iter().try_for_each(|name| writeln!(w, "property uchar {name}"))?;
     }
-    for name in property_names(attributes) {
-        writeln!(w, "property float {name}")?;
+    for (name, kind) in property_names(attributes).iter().zip(property_types(attributes)) {
+        writeln!(w, "property {kind} {name}")?;
     }
     writeln!(w, "element face {}\nproperty list uchar int vertex_indices", mesh.n_faces())?;
     if attributes.corner_uvs.is_some() {
@@ -87,11 +90,35 @@ fn property_names(attributes: &Attributes) -> Vec<String> {
         }
         name
     };
-    attributes.vertex_scalars.iter().map(|(name, _)| name).map(free).collect()
+    let integers = attributes.vertex_integers.iter().map(|field| &field.name);
+    attributes.vertex_scalars.iter().map(|(name, _)| name).chain(integers).map(free).collect()
+}
+
+/// The types of the fields, in the same order.
+fn property_types(attributes: &Attributes) -> impl Iterator<Item = &'static str> + '_ {
+    let scalars = attributes
+        .vertex_scalars
+        .iter()
+        .map(|(_, values)| if is_single(values) { "float" } else { "double" });
+    scalars.chain(attributes.vertex_integers.iter().map(|field| match field.kind {
+        IntegerKind::I8 => "char",
+        IntegerKind::U8 => "uchar",
+        IntegerKind::I16 => "short",
+        IntegerKind::U16 => "ushort",
+        IntegerKind::I32 => "int",
+        IntegerKind::U32 => "uint",
+    }))
+}
+
+/// Whether single precision holds all values exactly.
+fn is_single(values: &[f64]) -> bool {
+    values.iter().all(|&x| x.is_nan() || f64::from(x as f32) == x)
 }
 
 fn write_vertices(w: &mut dyn Write, mesh: &Mesh, attributes: &Attributes, single: bool) -> io::Result<()> {
     let mut record = Vec::new();
+    let scalars: Vec<(bool, &[f64])> =
+        attributes.vertex_scalars.iter().map(|(_, values)| (is_single(values), values.as_slice())).collect();
     for (i, position) in mesh.vertices().iter().enumerate() {
         record.clear();
         if single {
@@ -100,7 +127,13 @@ fn write_vertices(w: &mut dyn Write, mesh: &Mesh, attributes: &Attributes, singl
             position.iter().for_each(|x| record.extend(x.to_le_bytes()));
         }
         record.extend(attributes.vertex_colors.iter().flat_map(|colors| colors[i]));
-        attributes.vertex_scalars.iter().for_each(|(_, values)| record.extend(values[i].to_le_bytes()));
+        for (single, values) in &scalars {
+            match single {
+                true => record.extend((values[i] as f32).to_le_bytes()),
+                false => record.extend(values[i].to_le_bytes()),
+            }
+        }
+        attributes.vertex_integers.iter().for_each(|field| field.kind.put(field.values[i], &mut record));
         w.write_all(&record)?;
     }
     Ok(())
@@ -119,45 +152,4 @@ fn write_faces(w: &mut dyn Write, mesh: &Mesh, attributes: &Attributes) -> io::R
         w.write_all(&record)?;
     }
     Ok(())
-}
-
-impl Texture {
-    /// How a mesh file at `path` refers to the image: a name relative to its folder. An image that is elsewhere or embedded
-    /// is written beside the mesh; one that does not exist is referred to by its absolute path.
-    pub(in crate::io) fn place_beside(&self, path: &Path) -> Result<String, IoError> {
-        match self {
-            Self::File(image) => {
-                let folder = path.parent().unwrap_or(Path::new(""));
-                let inside = image.strip_prefix(folder).ok().filter(|p| p.is_relative());
-                let name = match inside {
-                    Some(inside) => inside.to_path_buf(),
-                    None => copied(image, path)?
-                        .unwrap_or_else(|| std::path::absolute(image).unwrap_or_else(|_| image.clone())),
-                };
-                Ok(name.to_string_lossy().replace(char::is_control, "_"))
-            }
-            Self::Embedded { bytes, mime } => {
-                let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-                let extension = if mime == "image/jpeg" { "jpg" } else { "png" };
-                let name = format!("{stem}_texture.{extension}");
-                write_atomically(&path.with_file_name(&name), |w| w.write_all(bytes))?;
-                Ok(name)
-            }
-        }
-    }
-}
-
-/// Copies an image beside the mesh as `STEM_texture.EXTENSION`; its name, or `None` where the image cannot be read.
-fn copied(image: &Path, mesh: &Path) -> Result<Option<PathBuf>, IoError> {
-    let readable = std::fs::metadata(image).is_ok_and(|m| m.is_file());
-    let Some(bytes) = readable.then(|| std::fs::read(image).ok()).flatten() else { return Ok(None) };
-    let mut name = mesh.file_stem().unwrap_or_default().to_os_string();
-    name.push("_texture");
-    let mut name = PathBuf::from(name);
-    if let Some(extension) = image.extension() {
-        name.as_mut_os_string().push(".");
-        name.as_mut_os_string().push(extension);
-    }
-    write_atomically(&mesh.with_file_name(&name), |w| w.write_all(&bytes))?;
-    Ok(Some(name))
 }

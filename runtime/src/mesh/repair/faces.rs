@@ -6,7 +6,7 @@ use crate::mesh::geometry::is_degenerate;
 use std::collections::HashMap;
 
 /// For every vertex the first one at the identical position. Zeros of either sign are identical.
-pub(in crate::mesh) fn weld(mesh: &Mesh) -> Vec<u32> {
+pub(crate) fn weld(mesh: &Mesh) -> Vec<u32> {
     let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.n_vertices());
     let key = |p: &[f64; 3]| p.map(|x| (x + 0.0).to_bits());
     mesh.vertices().iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()

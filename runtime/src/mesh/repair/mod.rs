@@ -2,7 +2,8 @@
 
 mod cut;
 mod faces;
-pub(super) use faces::{repeated_faces, weld};
+pub(super) use faces::repeated_faces;
+pub(crate) use faces::weld;
 mod orient;
 
 use super::Mesh;

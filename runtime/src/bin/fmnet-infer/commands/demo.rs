@@ -2,7 +2,7 @@
 
 use super::output::{self, MapOutput};
 use crate::args::DemoArgs;
-use crate::console::Console;
+use crate::console::{Console, shown};
 use anyhow::Result;
 use fmnet::eval::{ErrorSummary, GroundTruth, geodesic_errors};
 use fmnet::events::timed;
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
     let seconds = start.elapsed().as_secs_f64();
     console.result(
         &text,
-        json!({ "summary": summary, "match_seconds": match_seconds, "seconds": seconds, "viewer": args.out }),
-    );
+        json!({ "summary": summary, "match_seconds": match_seconds, "seconds": seconds, "viewer": shown(&args.out) }),
+    )?;
     Ok(())
 }

@@ -1,22 +1,26 @@
 //! `fmnet-infer match`: the map of one pair.
 
-use super::output::{self, MapOutput, file_name};
+use super::output::{self, Inputs, MapOutput, file_name};
 use crate::args::MatchArgs;
-use crate::console::Console;
-use anyhow::Result;
-use fmnet::io::{read_mesh, write_matrix};
+use crate::console::{Console, shown};
+use anyhow::{Result, bail};
+use fmnet::io::{MeshFile, read_mesh, write_matrix};
 use fmnet::pipeline::{Match, Matcher};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
-    output::check(&args.outputs)?;
+    let outputs = outputs(args)?;
     let start = Instant::now();
     let observer = |event| console.event(event);
     let matcher = Matcher::new(&args.pipeline.to_options())?;
-    let source = read(&args.source, console)?;
-    let target = read(&args.target, console)?;
+    let (source, target) = (read(&args.source, console)?, read(&args.target, console)?);
+    let mut inputs = Inputs::of_model(&args.pipeline.shape);
+    inputs.add_mesh(&args.source, &source);
+    inputs.add_mesh(&args.target, &target);
+    inputs.check(&outputs)?;
+    let (source, target) = (source.mesh, target.mesh);
     let (name_source, name_target) = (file_name(&args.source), file_name(&args.target));
     let (described_source, described_target) = rayon::join(
         || match args.partial {
@@ -38,22 +42,34 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     }
     let mut summary = summary(&matcher, &result);
     summary["source"] =
-        json!({ "file": args.source, "vertices": source.n_vertices(), "faces": source.n_faces() });
+        json!({ "file": shown(&args.source), "vertices": source.n_vertices(), "faces": source.n_faces() });
     summary["target"] =
-        json!({ "file": args.target, "vertices": target.n_vertices(), "faces": target.n_faces() });
-    summary["outputs"] = json!(args.outputs);
+        json!({ "file": shown(&args.target), "vertices": target.n_vertices(), "faces": target.n_faces() });
+    summary["outputs"] = args.outputs.iter().map(|path| shown(path)).collect();
     summary["seconds"] = json!(start.elapsed().as_secs_f64());
-    console.result(&text, summary);
-    Ok(())
+    Ok(console.result(&text, summary)?)
 }
 
-/// Reads a mesh and passes on what its reader has to say.
-pub(super) fn read(path: &Path, console: &Console) -> Result<fmnet::Mesh> {
+/// All outputs; refuses those that could not be written.
+fn outputs(args: &MatchArgs) -> Result<Vec<PathBuf>> {
+    let matrix = args.save_functional_map.iter();
+    let is_npy = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    if let Some(path) = matrix.clone().find(|path| !is_npy(path)) {
+        bail!("--save-functional-map {}: the matrix is written as .npy; name the file so", path.display());
+    }
+    output::check(&args.outputs)?;
+    let all: Vec<PathBuf> = args.outputs.iter().chain(matrix).cloned().collect();
+    output::check_places(&all)?;
+    Ok(all)
+}
+
+/// Reads a mesh and passes on what its reader has to say about the geometry.
+pub(super) fn read(path: &Path, console: &Console) -> Result<MeshFile> {
     let file = read_mesh(path)?;
     for warning in &file.info.warnings {
         console.warn(&format!("{}: {warning}", path.display()));
     }
-    Ok(file.mesh)
+    Ok(file)
 }
 
 fn summary_text(result: &Match, seconds: f64) -> String {

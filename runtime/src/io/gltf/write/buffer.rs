@@ -1,12 +1,13 @@
 //! The binary chunk, and the views and accessors into it.
 
 use gltf::json::accessor::{Accessor, ComponentType, GenericComponentType, Type};
-use gltf::json::buffer::{Target, View};
+use gltf::json::buffer::{Stride, Target, View};
 use gltf::json::validation::Checked::Valid;
 use gltf::json::validation::USize64;
 use gltf::json::{self, Index, Root};
 
 use super::Misfit;
+use crate::io::attributes::IntegerKind;
 
 /// How the bytes of an array are to be read.
 #[derive(Clone, Copy)]
@@ -43,26 +44,39 @@ impl Buffer {
 
     fn accessor(&mut self, bytes: &[u8], numbers: Numbers, target: Option<Target>) -> Index<Accessor> {
         let size = numbers.kind.size() * numbers.components.multiplicity();
-        let accessor = Accessor {
-            buffer_view: Some(self.view(bytes, target)),
-            byte_offset: Some(USize64(0)),
-            count: (bytes.len() / size).into(),
-            component_type: Valid(GenericComponentType(numbers.kind)),
-            extensions: None,
-            extras: Default::default(),
-            type_: Valid(numbers.components),
-            min: None,
-            max: None,
-            name: None,
-            normalized: numbers.normalized,
-            sparse: None,
-        };
-        self.root.push(accessor)
+        let view = self.view(bytes, target);
+        self.root.push(accessor(view, bytes.len() / size, numbers))
     }
 
     /// Adds a vertex attribute.
     pub(super) fn array(&mut self, bytes: &[u8], numbers: Numbers) -> Index<Accessor> {
         self.accessor(bytes, numbers, Some(Target::ArrayBuffer))
+    }
+
+    /// Adds integers as a vertex attribute, each at a multiple of four bytes as the specification demands.
+    pub(super) fn integers(
+        &mut self,
+        values: impl Iterator<Item = i64>,
+        kind: IntegerKind,
+    ) -> Index<Accessor> {
+        let (mut bytes, mut count) = (Vec::new(), 0usize);
+        for value in values {
+            kind.put(value, &mut bytes);
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+            count += 1;
+        }
+        let view = self.view(&bytes, Some(Target::ArrayBuffer));
+        self.root.buffer_views[view.value()].byte_stride = Some(Stride(4));
+        let component = match kind {
+            IntegerKind::I8 => ComponentType::I8,
+            IntegerKind::U8 => ComponentType::U8,
+            IntegerKind::I16 => ComponentType::I16,
+            IntegerKind::U16 => ComponentType::U16,
+            IntegerKind::I32 | IntegerKind::U32 => ComponentType::U32,
+        };
+        let numbers = Numbers { kind: component, components: Type::Scalar, normalized: false };
+        let accessor = accessor(view, count, numbers);
+        self.root.push(accessor)
     }
 
     /// Adds an array that is neither attribute nor index.
@@ -108,5 +122,22 @@ impl Buffer {
         let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
         let glb = gltf::Glb { header, json: text.into(), bin: Some(self.bytes.into()) };
         glb.to_vec().map_err(|e| (e.to_string(), "write a .ply file"))
+    }
+}
+
+fn accessor(view: Index<View>, count: usize, numbers: Numbers) -> Accessor {
+    Accessor {
+        buffer_view: Some(view),
+        byte_offset: Some(USize64(0)),
+        count: count.into(),
+        component_type: Valid(GenericComponentType(numbers.kind)),
+        extensions: None,
+        extras: Default::default(),
+        type_: Valid(numbers.components),
+        min: None,
+        max: None,
+        name: None,
+        normalized: numbers.normalized,
+        sparse: None,
     }
 }
