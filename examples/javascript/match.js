@@ -50,23 +50,36 @@ function forEachField(bytes, visit) {
   }
 }
 
-/** The eigenbasis [n, k] of a shape scaled to unit area, and the Fourier coefficients [k, 352] of its learned descriptors. */
-async function readShape(folder, session) {
+/** The first columns of a matrix, or entries of a vector, in single precision. */
+function asInput({ data, rows, cols }, width) {
+  if (cols === 1) return { values: Float32Array.from(data.subarray(0, width)), dims: [Math.min(width, rows)] };
+  const values = new Float32Array(rows * width);
+  for (let i = 0; i < rows; i++) values.set(data.subarray(i * cols, i * cols + width), i * width);
+  return { values, dims: [rows, width] };
+}
+
+/** The eigenbasis [n, k] of a shape at unit area, and the Fourier coefficients [k, d] of its learned descriptors. */
+async function readShape(folder, session, k) {
   const read = name => readNpy(path.join(folder, name + ".npy"));
-  const mass = read("mass").data, area = mass.reduce((a, b) => a + b);
-  const shot = read("shot"), { data: phi, rows: n, cols: k } = read("eigenvectors");
-  const input = new ort.Tensor("float32", shot.data, [n, shot.cols]);
-  const { descriptors } = await session.run({ shot: input });
-  const coefficients = Array.from({ length: k }, () => new Float64Array(shot.cols));
+  const inputs = {};
+  for (const { name, shape } of session.inputMetadata) {
+    const array = read(name), last = shape[shape.length - 1];
+    const { values, dims } = asInput(array, typeof last === "number" && last > 0 ? last : array.rows);
+    inputs[name] = new ort.Tensor("float32", values, dims);
+  }
+  const { descriptors } = await session.run(inputs);
+  const mass = read("mass").data, vectors = read("eigenvectors"), n = mass.length, d = descriptors.dims[1];
+  const phi = new Float64Array(n * k);
+  const coefficients = Array.from({ length: k }, () => new Float64Array(d));
   for (let i = 0; i < n; i++) {
     for (let j = 0; j < k; j++) {
-      phi[i * k + j] *= Math.sqrt(area);
-      const weight = phi[i * k + j] * mass[i] / area;
-      for (let q = 0; q < shot.cols; q++) coefficients[j][q] += weight * descriptors.data[i * shot.cols + q];
+      phi[i * k + j] = vectors.data[i * vectors.cols + j];
+      const weight = phi[i * k + j] * mass[i];
+      for (let q = 0; q < d; q++) coefficients[j][q] += weight * descriptors.data[i * d + q];
     }
   }
   const renumbered = fs.existsSync(path.join(folder, "vertices.npy")) ? read("vertices").data : null;
-  return { n, k, phi, coefficients, eigenvalues: read("eigenvalues").data.map(x => x * area), renumbered };
+  return { n, k, phi, coefficients, eigenvalues: read("eigenvalues").data.subarray(0, k), renumbered };
 }
 
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
@@ -132,13 +145,20 @@ function nearest(queries, rows) {
 }
 
 /** For each row of the source the row of the target that matches it. */
-function pointMap(source, target, solver) {
+function pointMap(source, target, solver, maskWeight) {
   const rows = shape => Array.from({ length: shape.n }, (_, i) => shape.phi.subarray(i * shape.k, (i + 1) * shape.k));
   if (solver === "least-squares") {
     return nearest(transported(source.phi, source.n, source.k, functionalMap(source, target, 0)), rows(target));
   }
+  const weight = solver === "joint" ? maskWeight : 0.03;
+  const forth = functionalMap(source, target, weight), back = functionalMap(target, source, weight);
+  if (solver === "joint") {
+    // Both directions beside each other: what either map misses counts.
+    const beside = (left, right) => left.map((row, i) => Float64Array.from([...row, ...right[i]]));
+    const image = (shape, map) => transported(shape.phi, shape.n, shape.k, map);
+    return nearest(beside(image(source, forth), rows(source)), beside(rows(target), image(target, back)));
+  }
   // Both directions: the map back, transposed, is another estimate of C.
-  const forth = functionalMap(source, target, 0.03), back = functionalMap(target, source, 0.03);
   const transpose = back.map((row, i) => row.map((x, j) => (x + forth[j][i]) / 2)); // C^T [k_source, k_target]
   return nearest(rows(source), transported(target.phi, target.n, target.k, transpose));
 }
@@ -146,8 +166,9 @@ function pointMap(source, target, solver) {
 async function main() {
   const [folderSource, folderTarget, model, out] = process.argv.slice(2);
   const session = await ort.InferenceSession.create(model);
-  const source = await readShape(folderSource, session), target = await readShape(folderTarget, session);
-  const matches = pointMap(source, target, readMetadata(model)["fmnet.solver"]);
+  const metadata = readMetadata(model), k = +metadata["fmnet.k"];
+  const source = await readShape(folderSource, session, k), target = await readShape(folderTarget, session, k);
+  const matches = pointMap(source, target, metadata["fmnet.solver"], +metadata["fmnet.mask_weight"]);
   fs.writeFileSync(out, matches.map(y => (target.renumbered ? target.renumbered[y] : y) + "\n").join(""));
 }
 

@@ -16,22 +16,28 @@ import onnxruntime
 
 
 class Shape:
-    """The eigenbasis [n, k] of a shape scaled to unit area, and its learned descriptors [n, 352]."""
+    """The eigenbasis [n, k] of a shape at unit area, and its learned descriptors [n, d]."""
 
-    def __init__(self, folder, session):
-        folder = Path(folder)
-        mass = np.load(folder / "mass.npy")
-        area = mass.sum()
-        self.mass = mass / area
-        self.eigenvalues = np.load(folder / "eigenvalues.npy") * area
-        self.eigenvectors = np.load(folder / "eigenvectors.npy") * np.sqrt(area)
-        (self.descriptors,) = session.run(["descriptors"], {"shot": np.load(folder / "shot.npy")})
-        renumbered = folder / "vertices.npy"
-        self.vertices = np.load(renumbered) if renumbered.exists() else np.arange(len(mass))
+    def __init__(self, folder, session, k):
+        def load(name):
+            return np.load(Path(folder) / f"{name}.npy")
+
+        # The model's inputs are quantities of the shape by name, each as wide as the model says.
+        inputs = {i.name: as_input(load(i.name), i.shape[-1]) for i in session.get_inputs()}
+        (self.descriptors,) = session.run(["descriptors"], inputs)
+        self.mass = load("mass")
+        self.eigenvalues, self.eigenvectors = load("eigenvalues")[:k], load("eigenvectors")[:, :k]
+        renumbered = Path(folder) / "vertices.npy"
+        self.vertices = np.load(renumbered) if renumbered.exists() else np.arange(len(self.mass))
 
     def coefficients(self):
-        """Fourier coefficients of the descriptors, [k, 352]."""
+        """Fourier coefficients of the descriptors, [k, d]."""
         return self.eigenvectors.T @ (self.mass[:, None] * self.descriptors)
+
+
+def as_input(values, width):
+    """The first columns in single precision; the last dimension is a name where it counts the vertices."""
+    return (values[..., :width] if isinstance(width, int) else values).astype(np.float32)
 
 
 def resolvent_mask(source, target):
@@ -45,7 +51,7 @@ def resolvent_mask(source, target):
     return np.abs(resolvent(target)[:, None] - resolvent(source)[None, :]) ** 2
 
 
-def regularized(source, target, mask_weight=0.03):
+def regularized(source, target, mask_weight):
     """C [k_target, k_source] with C F = G for the coefficients F of the source and G of the target, nearly diagonal."""
     F, G = source.coefficients(), target.coefficients()
     gram = F @ F.T
@@ -62,14 +68,18 @@ def nearest(queries, rows):
     return np.concatenate([(squares - 2 * block @ rows.T).argmin(axis=1) for block in blocks])
 
 
-def point_map(source, target, solver):
+def point_map(source, target, solver, mask_weight):
     """For each row of the source the row of the target that matches it."""
     phi, psi = source.eigenvectors, target.eigenvectors
     if solver == "least-squares":
         C = np.linalg.lstsq(source.coefficients().T, target.coefficients().T, rcond=None)[0].T
         return nearest(phi @ C.T, psi)
+    if solver == "joint":
+        # Both directions beside each other: what either map misses counts.
+        forth, back = regularized(source, target, mask_weight), regularized(target, source, mask_weight)
+        return nearest(np.hstack([phi @ forth.T, phi]), np.hstack([psi, psi @ back.T]))
     # Both directions: the map back, transposed, is another estimate of C.
-    C = (regularized(source, target) + regularized(target, source).T) / 2
+    C = (regularized(source, target, 0.03) + regularized(target, source, 0.03).T) / 2
     return nearest(phi, psi @ C)
 
 
@@ -77,8 +87,9 @@ def main():
     folder_source, folder_target, model, out = sys.argv[1:]
     session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
     metadata = session.get_modelmeta().custom_metadata_map
-    source, target = Shape(folder_source, session), Shape(folder_target, session)
-    matches = point_map(source, target, metadata["fmnet.solver"])
+    k = int(metadata["fmnet.k"])
+    source, target = Shape(folder_source, session, k), Shape(folder_target, session, k)
+    matches = point_map(source, target, metadata["fmnet.solver"], float(metadata["fmnet.mask_weight"]))
     np.savetxt(out, target.vertices[matches], fmt="%d")
 
 

@@ -204,6 +204,9 @@ pub(crate) struct ExportArgs {
     /// Licence of the weights, for the metadata
     #[arg(long, default_value = "unspecified")]
     pub(crate) license: String,
+    /// Meshes of more vertices are decimated to so many when they are matched, 100 or more; 0: never [default: as in training]
+    #[arg(long, value_name = "N")]
+    pub(crate) decimate: Option<usize>,
     /// Source revision, for the metadata
     #[arg(long, default_value = env!("CARGO_PKG_VERSION"))]
     pub(crate) commit: String,

@@ -1,7 +1,7 @@
 //! `fmnet-train export`.
 
 use crate::args::{Common, ExportArgs};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use candle_core::Device;
 use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::export::{ModelOrigin, export, metadata};
@@ -17,7 +17,12 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
         license: args.license.clone(),
         commit: args.commit.clone(),
     };
-    let metadata = metadata(&checkpoint, &origin);
+    let mut metadata = metadata(&checkpoint, &origin);
+    match args.decimate {
+        Some(n @ 1..100) => bail!("--decimate is {n}, but must be 100 or more, or 0 (never)"),
+        Some(n) => metadata.decimate = Some(n).filter(|&n| n > 0),
+        None => {}
+    }
     export(checkpoint.network(&Device::Cpu)?.as_ref(), &metadata, &args.output)?;
     if !common.quiet {
         eprintln!("{} -> {} ({} minibatches)", path.display(), args.output.display(), checkpoint.step);
