@@ -52,6 +52,12 @@ pub fn descriptor_bytes(n: usize, k: usize) -> u64 {
     with_margin(8 * n * k as u64 + 4 * 4 * 352 * n)
 }
 
+/// Bytes of a network on `n` vertices, given the widths of its inputs, all f32: the inputs twice, as the caller's and as the
+/// back-end's, and activations of some 20 times 128 channels.
+pub fn network_bytes(n: usize, input_width: usize) -> u64 {
+    with_margin(4 * n as u64 * (2 * input_width as u64 + 20 * 128))
+}
+
 /// Allocators and small arrays take their share.
 fn with_margin(bytes: u64) -> u64 {
     bytes + bytes / 8

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::graph::LocalGraph;
 use super::search::Search;
 use super::surface::Surface;
-use crate::mesh::{MeshError, UnionFind, vec3, weld};
+use crate::mesh::{MeshError, Topology, UnionFind, vec3, weld};
 use crate::{Matrix, Mesh};
 
 /// How finely a [`GeodesicSolver`] works.
@@ -34,7 +34,8 @@ impl Default for GeodesicOptions {
 /// is then the shortest chain of such lines. It is an upper bound of the exact distance ([`exact`](super::exact()))
 /// and equal to it as long as the shortest path has no straight part longer than the neighbourhood.
 ///
-/// Vertices at one place are one vertex, so meshes whose triangles share no vertices are surfaces all the same.
+/// Boundary vertices at one place are one vertex, so meshes whose triangles share no vertices are surfaces all the same. Where
+/// a closed surface touches itself, nothing is joined.
 ///
 /// Lengths are in the mesh's unit. Vertices on another component are infinitely far. A boundary is an obstacle that
 /// paths go around. Where more than two faces share an edge a path may pass between any two of them; at other
@@ -59,7 +60,7 @@ pub struct GeodesicSolver {
 impl GeodesicSolver {
     /// Finds the straight geodesics around every vertex, in parallel. Options out of range are moved into it.
     pub fn new(mesh: &Mesh, options: &GeodesicOptions) -> Self {
-        let welded = weld(mesh);
+        let welded = weld_boundaries(mesh);
         let component = components(mesh, &welded);
         let is_welded = welded.iter().enumerate().all(|(i, &v)| i == v as usize);
         let joined =
@@ -221,6 +222,26 @@ impl GeodesicSolver {
             |search, (row, &source)| write(row, search.run(&[self.welded[source as usize]])),
         );
     }
+}
+
+/// For every vertex the first one at its place, where both are on a boundary; else itself.
+fn weld_boundaries(mesh: &Mesh) -> Vec<u32> {
+    let places = weld(mesh);
+    let mut welded: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
+    if places == welded {
+        return welded;
+    }
+    let topology = Topology::new(mesh);
+    let mut on_boundary = vec![false; mesh.n_vertices()];
+    for edge in topology.boundary_edges() {
+        topology.edges()[edge as usize].iter().for_each(|&v| on_boundary[v as usize] = true);
+    }
+    // The first boundary vertex of each place.
+    let mut first = vec![None; mesh.n_vertices()];
+    for v in (0..mesh.n_vertices()).filter(|&v| on_boundary[v]) {
+        welded[v] = *first[places[v] as usize].get_or_insert(v as u32);
+    }
+    welded
 }
 
 /// The mesh with other faces of the same vertices.

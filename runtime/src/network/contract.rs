@@ -433,7 +433,11 @@ mod tests {
                 broken(&|m| m.graph.as_mut().unwrap().input[0].name = "colour".into()),
                 "\"colour\" is not a quantity",
             ),
-            (broken(&|m| m.graph.as_mut().unwrap().input[0].name = "mass".into()), "format 1"),
+            (
+                broken(&|m| m.graph.as_mut().unwrap().input[0].name = "mass".into()),
+                "\"mass\": expected the shape [n]",
+            ),
+            (broken(&|m| m.graph.as_mut().unwrap().input[0].name = "eigenvectors".into()), "format 1"),
             (broken(&|m| set(m, "fmnet.format_version", "9")), "format 9"),
             (broken(&|m| m.graph.as_mut().unwrap().output[0].kind = None), "output: not a tensor"),
             (broken(&|m| set(m, "fmnet.solver", "magic")), "fmnet.solver is \"magic\""),
