@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     fn wave(i: usize, j: usize) -> f64 {
-        ((i * (j + 2)) as f64 * 0.7).sin() + if i % (j + 2) == 0 { 1.0 } else { 0.0 }
+        ((i * (j + 2)) as f64 * 0.7).sin() + if i.is_multiple_of(j + 2) { 1.0 } else { 0.0 }
     }
 
     #[test]

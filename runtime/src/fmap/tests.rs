@@ -174,7 +174,8 @@ fn gradients_equal_central_differences() {
     let (f, g, weights) = (random(5, 9, 41), random(4, 9, 42), random(4, 5, 43));
     let spectrum = |scale: f64, k: usize| (0..k).map(|i| scale * i as f64).collect::<Vec<_>>();
     let mask = resolvent_mask(&spectrum(12.0, 5), &spectrum(13.5, 4));
-    let by: [(&str, &dyn Fn(&Matrix, &Matrix) -> FmapSolution); 2] = [
+    type Solve<'a> = &'a dyn Fn(&Matrix, &Matrix) -> FmapSolution;
+    let by: [(&str, Solve); 2] = [
         ("least squares", &|f, g| {
             FmapSolution::least_squares(f.clone(), g.clone(), &LeastSquaresOptions::default()).unwrap()
         }),

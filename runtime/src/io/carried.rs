@@ -241,7 +241,8 @@ mod tests {
                 crate::io::write_mesh(&path, &mesh, &attributes).unwrap();
                 let mut found: Vec<PathBuf> =
                     std::fs::read_dir(&inner).unwrap().map(|entry| entry.unwrap().path()).collect();
-                (expected.sort(), found.sort());
+                expected.sort();
+                found.sort();
                 assert_eq!(found, expected, "{texture:?}");
             }
         }

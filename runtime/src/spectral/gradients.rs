@@ -136,10 +136,10 @@ mod tests {
             let p = mesh.vertices()[v];
             let at = |j: usize| [gradients.x[(v, j)], gradients.y[(v, j)]];
             assert!(at(0).iter().all(|x| x.abs() < 1e-12), "a constant has no gradient");
-            for j in 0..3 {
-                let [x, y] = at(j + 1);
+            for (axis, along) in p.into_iter().enumerate() {
+                let [x, y] = at(axis + 1);
                 // The gradient of a coordinate is its axis projected on the tangent plane.
-                assert!((x * x + y * y - (1.0 - p[j] * p[j])).abs() < 0.02, "vertex {v}, axis {j}");
+                assert!((x * x + y * y - (1.0 - along * along)).abs() < 0.02, "vertex {v}, axis {axis}");
             }
             // The gradients of x and y turn counter-clockwise, seen from outside, by the sign of z.
             let ([ax, ay], [bx, by]) = (at(1), at(2));

@@ -43,11 +43,8 @@ pub fn write_demo(folder: &Path) -> Result<(), SynthError> {
 fn landmarks_first(body: &Body) -> Mesh {
     let mut place = vec![u32::MAX; body.mesh.n_vertices()];
     body.landmarks.iter().enumerate().for_each(|(i, &vertex)| place[vertex as usize] = i as u32);
-    let mut next = body.landmarks.len() as u32;
-    for slot in place.iter_mut().filter(|slot| **slot == u32::MAX) {
-        *slot = next;
-        next += 1;
-    }
+    let others = place.iter_mut().filter(|slot| **slot == u32::MAX);
+    others.zip(body.landmarks.len() as u32..).for_each(|(slot, next)| *slot = next);
     let mut vertices = vec![[0.0; 3]; place.len()];
     place.iter().zip(body.mesh.vertices()).for_each(|(&i, &p)| vertices[i as usize] = p);
     let faces = body.mesh.faces().iter().map(|face| face.map(|i| place[i as usize])).collect();

@@ -13,10 +13,13 @@ use crate::io::error::{ParseError, Parsed};
 /// Sets of four joints beyond this are not looked for.
 const MAX_SETS: u32 = 16;
 
+/// Four joints of every vertex, and their weights.
+type JointSet = (Vec<[f64; 4]>, Vec<[f32; 4]>);
+
 /// The joints that move each vertex, in the skin's own numbering, with their weights.
 pub(super) struct Influences {
     /// For each set of four joints those of every vertex.
-    sets: Vec<(Vec<[f64; 4]>, Vec<[f32; 4]>)>,
+    sets: Vec<JointSet>,
 }
 
 /// Whether a primitive has joints.
