@@ -393,6 +393,17 @@ fn sheets(values: &[f64], cell: [usize; 3]) -> Vec<Vec<u8>> {
     result.into_iter().map(|(_, edges)| edges).collect()
 }
 
+/// Where a field of these values at the ends of an edge crosses zero, from 0 to 1. Far from the surface the field is infinite:
+/// the crossing then is at the other end.
+fn crossing(low: f64, high: f64) -> f64 {
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) => low / (low - high),
+        (true, false) => 0.0,
+        (false, true) => 1.0,
+        (false, false) => 0.5,
+    }
+}
+
 /// Mean of the points where the surface crosses the given edges of a cell, in units of the cell.
 fn mean_crossing(values: &[f64], cell: [usize; 3], edges: &[u8]) -> Vec3 {
     let mut sum = [0.0; 3];
@@ -401,7 +412,7 @@ fn mean_crossing(values: &[f64], cell: [usize; 3], edges: &[u8]) -> Vec3 {
         let (low, high) = (corner_value(values, cell, start), corner_value(values, cell, end));
         for (axis, coordinate) in sum.iter_mut().enumerate() {
             *coordinate +=
-                if axis == edge as usize / 4 { low / (low - high) } else { ((start >> axis) & 1) as f64 };
+                if axis == edge as usize / 4 { crossing(low, high) } else { ((start >> axis) & 1) as f64 };
         }
     }
     sum.map(|x| x / edges.len() as f64)
