@@ -66,8 +66,8 @@ fn shortened(program: &str, command: &str) -> &'static [&'static str] {
         ("fmnet-train", "train") => &[
             "--steps",
             "2",
-            "--blocks",
-            "1",
+            "--set",
+            "network.blocks=1",
             "--k",
             "20",
             "--points",

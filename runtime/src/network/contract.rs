@@ -438,7 +438,6 @@ mod tests {
                 "\"mass\": expected the shape [n]",
             ),
             (broken(&|m| m.graph.as_mut().unwrap().input[0].name = "eigenvectors".into()), "format 1"),
-            (broken(&|m| set(m, "fmnet.format_version", "9")), "format 9"),
             (broken(&|m| m.graph.as_mut().unwrap().output[0].kind = None), "output: not a tensor"),
             (broken(&|m| set(m, "fmnet.solver", "magic")), "fmnet.solver is \"magic\""),
             (broken(&|m| set(m, "fmnet.k", "many")), "fmnet.k is \"many\""),
@@ -446,5 +445,7 @@ mod tests {
         for (error, what) in errors {
             assert!(error.contains(what) && error.contains("; export the model"), "{error}");
         }
+        let newer = broken(&|m| set(m, "fmnet.format_version", "9"));
+        assert!(newer.contains("format 9") && newer.ends_with("install a newer fmnet"), "{newer}");
     }
 }

@@ -80,29 +80,34 @@ impl Descriptor for NetworkDescriptor {
 }
 
 impl NetworkDescriptor {
-    /// The network's inputs in its order, each row-major in single precision, at unit area.
+    /// The network's inputs in its order, each row-major in single precision, at unit area. Eigenpairs that a small mesh does
+    /// not have are zero, which adds nothing to any sum over eigenpairs.
     ///
     /// # Errors
     /// If a quantity cannot be computed; it names the shape.
     pub fn inputs(&self, shape: &Shape, context: Context) -> Result<Vec<(ModelInput, Vec<f32>)>, Error> {
-        // Asked for once at its largest, the eigenbasis serves every smaller one.
-        let pairs = self.eigenpairs();
-        if pairs > 0 {
-            shape.eigenbasis(pairs, context)?;
-        }
         let inputs = &self.network.contract().inputs;
         inputs.iter().map(|&input| Ok((input, self.input(input, shape, context)?))).collect()
     }
 
     fn input(&self, input: ModelInput, shape: &Shape, context: Context) -> Result<Vec<f32>, Error> {
-        let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect();
+        let width = input.width;
+        let k = width.min(shape.max_eigenpairs());
+        let columns = |matrix: &Matrix| -> Vec<f32> {
+            let row =
+                |i: usize| matrix.row(i).iter().map(|&x| x as f32).chain(std::iter::repeat_n(0.0, width - k));
+            (0..matrix.rows()).flat_map(row).collect()
+        };
         Ok(match input.quantity {
             Quantity::Shot => shape.shot(&self.shot, context)?.data().to_vec(),
-            Quantity::Mass => single(&shape.unit_basis(1, context)?.mass),
-            Quantity::Eigenvalues => single(&shape.unit_basis(input.width, context)?.eigenvalues),
-            Quantity::Eigenvectors => single(shape.unit_basis(input.width, context)?.eigenvectors.data()),
-            Quantity::GradientsX => single(shape.gradients(input.width, context)?.x.data()),
-            Quantity::GradientsY => single(shape.gradients(input.width, context)?.y.data()),
+            Quantity::Mass => shape.unit_basis(1, context)?.mass.iter().map(|&x| x as f32).collect(),
+            Quantity::Eigenvalues => {
+                let values = shape.unit_basis(k, context)?.eigenvalues;
+                values.into_iter().map(|x| x as f32).chain(std::iter::repeat_n(0.0, width - k)).collect()
+            }
+            Quantity::Eigenvectors => columns(&shape.unit_basis(k, context)?.eigenvectors),
+            Quantity::GradientsX => columns(&shape.gradients(k, context)?.x),
+            Quantity::GradientsY => columns(&shape.gradients(k, context)?.y),
         })
     }
 }

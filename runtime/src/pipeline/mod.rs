@@ -16,7 +16,7 @@ mod pair;
 use crate::cache::Cache;
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
-use crate::events::Observer;
+use crate::events::{Event, Observer};
 use crate::fmap::{FmapInfo, FmapSolver};
 use crate::network::DescriptorNetwork;
 use crate::point_map::PointMap;
@@ -205,8 +205,15 @@ impl Matcher {
         let wanted = self.refinement(options.whole_area.is_some()).eigenpairs(self.k);
         // Small meshes do not have so many eigenfunctions as refinement would like.
         let refined_k = wanted.min((shape.n() / 4).max(self.k));
+        let described_k = self.descriptor().eigenpairs();
+        if described_k > shape.max_eigenpairs() {
+            observer(Event::Warning(format!(
+                "{name}: {} vertices are few, of which the model sees less than of finer meshes; subdivide the mesh for a better map",
+                shape.n()
+            )));
+        }
         // Asked for once at its largest, the eigenbasis serves every smaller one.
-        shape.eigenbasis(refined_k.max(self.descriptor().eigenpairs()), context)?;
+        shape.eigenbasis(refined_k.max(described_k.min(shape.max_eigenpairs())), context)?;
         let descriptors = self.descriptor().describe(&shape, context)?;
         Ok(DescribedShape { shape, descriptors, refined_k })
     }

@@ -104,7 +104,9 @@ fn a_pair_is_learned_in_some_dozens_of_steps() {
         let mut runner = runner(options.clone());
         let first = runner.step(&pairs, 1e-2).unwrap();
         let last = (0..60).map(|_| runner.step(&pairs, 1e-2).unwrap()).last().unwrap();
-        assert!(last.loss < 0.5 * first.loss, "{options:?}: {first:?} to {last:?}");
+        // The cross entropy of 60 points at this temperature has a floor of its own.
+        let share = if options.loss.contrastive > 0.0 { 0.75 } else { 0.5 };
+        assert!(last.loss < share * first.loss, "{options:?}: {first:?} to {last:?}");
     }
 }
 

@@ -24,7 +24,8 @@ pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
     create_folder(&args.out)?;
     let described = matcher.describe(&file_name(&args.mesh), &file.mesh, &observer)?;
     let (shape, context) = (&described.shape, matcher.context(&observer));
-    let basis = shape.unit_basis(matcher.k().max(matcher.descriptor().eigenpairs()), context)?;
+    let described_k = matcher.descriptor().eigenpairs().min(shape.max_eigenpairs());
+    let basis = shape.unit_basis(matcher.k().max(described_k), context)?;
     let inputs = match matcher.network_descriptor() {
         Some(network) => network.inputs(shape, context)?,
         None => Vec::new(),

@@ -74,8 +74,9 @@ fn file_of(root: &Path, name: &[u8]) -> PathBuf {
 /// The two names of a line: of all ways to read it the one by which most files exist, of several the first.
 fn names<'a>(line: &'a [u8], exists: impl Fn(&[u8]) -> bool) -> Option<Names<'a>> {
     let begins = |i: &usize| line[*i] == b'#' && *i > 0 && line[*i - 1].is_ascii_whitespace();
-    let without_comment = (0..line.len()).find(begins).map_or(line, |at| line[..at].trim_ascii());
-    let readings = readings(line).into_iter().chain(readings(without_comment));
+    // A name may have a # of its own: the line as it is, then without what may be a comment, the shortest comment first.
+    let ends = std::iter::once(line.len()).chain((0..line.len()).rev().filter(begins).take(16));
+    let readings = ends.flat_map(|end| readings(line[..end].trim_ascii()));
     let scored = readings.map(|names| (names.iter().filter(|name| exists(name)).count(), names));
     let best = scored.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     let is_comment = line.starts_with(b"#") && best.0 < 2;
