@@ -220,7 +220,9 @@ fn every_option_that_a_page_names_exists() {
         "only",
         "subdivisions",
     ];
-    known.extend(others.into_iter().chain(["meshes", "corres", "nocapture", "open"]).map(str::to_string));
+    known.extend(
+        others.into_iter().chain(["meshes", "corres", "nocapture", "open", "dressed"]).map(str::to_string),
+    );
     for page in pages() {
         for option in options(&code(&page)) {
             assert!(known.contains(&option), "{}: no program has an option --{option}", page.display());

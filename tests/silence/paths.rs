@@ -45,7 +45,10 @@ fn every_place_of_a_path_takes_any_name() {
         (with(&["inspect"], &[name("off")], &[]), 0),
         (with(&["match"], &[name("off"), "b.off".into(), "-o".into(), name("npy")], shot), 0),
         (with(&["match", "a.off", "b.off", "-o", "m.txt", "--save-functional-map"], &[name("npy")], shot), 0),
-        (with(&["match", "a.off", "b.off", "-o", "m.txt", "--cache"], &[folder.clone()], shot), 0),
+        (
+            with(&["match", "a.off", "b.off", "-o", "m.txt", "--cache"], std::slice::from_ref(&folder), shot),
+            0,
+        ),
         (with(&["match", "a.off", "b.off", "-o"], &[name("html")], shot), 0),
         (with(&["match", "a.off", "b.off", "-o", "m.txt", "--model"], &[name("onnx")], &[]), 2),
         (
@@ -73,7 +76,7 @@ fn every_place_of_a_path_takes_any_name() {
             ),
             0,
         ),
-        (with(&["batch", "list.txt", "--out"], &[folder.clone()], shot), 2),
+        (with(&["batch", "list.txt", "--out"], std::slice::from_ref(&folder), shot), 2),
         (with(&["batch", "list.txt", "--out", "o", "--root"], &[folder], shot), 2),
     ];
     for (arguments, code) in commands {
