@@ -4,7 +4,7 @@
 //! `[width in, width out]`; there are no biases, which a normalisation would cancel. A normalisation maps each channel to
 //! mean 0 and variance 1, then multiplies it by a learnable scale and adds a learnable shift.
 //!
-//! All parameters live in one flat variable, in the order of [`Network::parameters`](super::Network::parameters); on the CPU the network is one fused
+//! All parameters live in one flat variable, in the order of [`Network::parameters`]; on the CPU the network is one fused
 //! op, elsewhere it is composed of Candle's ops.
 
 mod block;
