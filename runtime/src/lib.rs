@@ -43,10 +43,10 @@
 //! | repair, decimation | [`mesh`] | an oriented manifold of bounded size, with the way back to the input's vertices |
 //! | eigenbasis | [`spectral`] | the first `k` eigenfunctions of the Laplace-Beltrami operator, `[n, k]` |
 //! | SHOT | [`descriptor`] | local shape around each vertex, `[n, 352]` |
-//! | network | [`network`] | learned descriptors, `[n, 352]`, by tract or onnxruntime |
+//! | network | [`network`], [`diffusion_net`] | learned descriptors, `[n, d]`, by tract or onnxruntime |
 //! | functional map | [`fmap`] | the matrix `C`, `[k_target, k_source]` |
 //! | point map | [`point_map`] | for each source vertex a target vertex |
-//! | refinement | [`refine`] | ZoomOut, spectral ICP, the product manifold filter |
+//! | refinement | [`refine`] | the wavelet filter, ZoomOut, spectral ICP, the product manifold filter |
 //! | upscaling | [`upscale`] | from decimated to full meshes |
 //! | evaluation | [`eval`], [`geodesic`] | geodesic errors and curves; exact distances |
 //! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |

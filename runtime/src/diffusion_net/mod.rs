@@ -38,7 +38,7 @@ const CHUNK: usize = 256;
 /// Sums over all vertices are taken in so many parts, which are added in order.
 const PIECES: usize = 4;
 /// Shorter diffusion times count as this.
-const MIN_TIME: f64 = 1e-8;
+pub const MIN_TIME: f64 = 1e-8;
 
 /// The sizes of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

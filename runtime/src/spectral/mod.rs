@@ -21,4 +21,4 @@ pub use laplacian::Laplacian;
 pub use mass::lumped_mass;
 pub use sparse::SparseMatrix;
 pub use stiffness::cotangent_stiffness;
-pub use wks::{WksOptions, wks, wks_of, wks_weights};
+pub use wks::{WKS_HEADROOM, WKS_WIDTH, WKS_ZERO, WksOptions, wks, wks_of, wks_weights};

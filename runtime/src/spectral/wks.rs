@@ -6,11 +6,11 @@ use crate::numeric::{MatrixView, par_matmul};
 use serde::{Deserialize, Serialize};
 
 /// Eigenvalues at unit area up to this are zeros, of further components; they carry no energy.
-const ZERO: f64 = 1e-6;
+pub const WKS_ZERO: f64 = 1e-6;
 /// Keeps the highest energy a little below the last eigenvalue.
-const HEADROOM: f64 = 1.02;
+pub const WKS_HEADROOM: f64 = 1.02;
 /// Width of an energy in steps of an even division of the range.
-const WIDTH: f64 = 7.0;
+pub const WKS_WIDTH: f64 = 7.0;
 
 /// Options of [`wks`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -33,12 +33,12 @@ impl Default for WksOptions {
 /// 7 (l_max / 1.02 - l_min) / q`; the weights are `exp(-(e - l)^2 / (2 s^2))`. The first eigenpair and those of eigenvalue
 /// zero have none.
 pub fn wks_weights(eigenvalues: &[f64], energies: usize) -> Matrix {
-    let logarithm = |i: usize| (i > 0 && eigenvalues[i] > ZERO).then(|| eigenvalues[i].ln());
+    let logarithm = |i: usize| (i > 0 && eigenvalues[i] > WKS_ZERO).then(|| eigenvalues[i].ln());
     let logarithms: Vec<Option<f64>> = (0..eigenvalues.len()).map(logarithm).collect();
     let known = || logarithms.iter().flatten().copied();
     let (low, high) =
-        (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max) / HEADROOM);
-    let width = WIDTH * (high - low) / energies as f64;
+        (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max) / WKS_HEADROOM);
+    let width = WKS_WIDTH * (high - low) / energies as f64;
     let (first, last) = (low + 2.0 * width, high - 2.0 * width);
     let step = if energies > 1 { (last - first) / (energies - 1) as f64 } else { 0.0 };
     let mut weights = Matrix::zeros(energies, eigenvalues.len());

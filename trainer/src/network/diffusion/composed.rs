@@ -2,10 +2,7 @@
 
 use crate::network::NetworkInput;
 use candle_core::{D, Result, Tensor};
-use fmnet::diffusion_net::Architecture;
-
-/// Shorter diffusion times count as this, as in the fused op.
-const MIN_TIME: f64 = 1e-8;
+use fmnet::diffusion_net::{Architecture, MIN_TIME};
 
 /// Descriptors `[n, outputs]` of a shape, with `parameters` flat, `[p]`, of the type that the work is done in.
 pub(super) fn forward(

@@ -4,12 +4,10 @@
 
 use super::{DiffusionOptions, SHOT_WIDTH};
 use crate::export::{GraphBuilder, Parameters, axis, integer};
+use fmnet::diffusion_net::MIN_TIME;
 use fmnet::network::contract::Quantity;
+use fmnet::spectral::{WKS_HEADROOM, WKS_WIDTH, WKS_ZERO};
 
-/// As in [`fmnet::spectral::wks_weights`].
-const ZERO: f32 = 1e-6;
-const HEADROOM: f32 = 1.02;
-const WIDTH: f32 = 7.0;
 /// Farther than any logarithm of an eigenvalue.
 const FAR: f32 = 1e3;
 
@@ -96,7 +94,7 @@ fn wave_kernel_signature(
         vectors = graph.first("wks.eigenvectors", &vectors, 1, options.wks_eigenfunctions);
     }
     let scalar = |graph: &mut GraphBuilder, name: &str, value: f32| graph.constant(name, &[], &[value]);
-    let zero = scalar(graph, "wks.zero", ZERO);
+    let zero = scalar(graph, "wks.zero", WKS_ZERO as f32);
     let one = scalar(graph, "wks.one", 1.0);
     let far = scalar(graph, "wks.far", FAR);
     let near = scalar(graph, "wks.near", -FAR);
@@ -108,10 +106,10 @@ fn wave_kernel_signature(
     let high = graph.node("Where", "wks.high.entries", &[&known, &logs, &near], Vec::new());
     let high = graph.node("ReduceMax", "wks.high", &[&high], vec![axis(0), integer("keepdims", 1)]);
     // Energies low + 2 s + step e with s = 7 range / q and step = (range - 4 s) / (q - 1): multiples of the range.
-    let headroom = scalar(graph, "wks.headroom", HEADROOM);
+    let headroom = scalar(graph, "wks.headroom", WKS_HEADROOM as f32);
     let high = graph.node("Div", "wks.top", &[&high, &headroom], Vec::new());
     let range = graph.node("Sub", "wks.range", &[&high, &low], Vec::new());
-    let width = WIDTH / q as f32;
+    let width = WKS_WIDTH as f32 / q as f32;
     let step = if q > 1 { (1.0 - 4.0 * width) / (q - 1) as f32 } else { 0.0 };
     let shares: Vec<f32> = (0..q).map(|e| 2.0 * width + step * e as f32).collect();
     let shares = graph.constant("wks.shares", &[q, 1], &shares);
@@ -147,7 +145,7 @@ fn residual_block(
         graph.node(op, &part(name), &inputs, Vec::new())
     };
     // The coefficients, `[width, k]`.
-    let times: Vec<f32> = parameters.get(&part("time")).iter().map(|t| t.max(1e-8)).collect();
+    let times: Vec<f32> = parameters.get(&part("time")).iter().map(|t| t.max(MIN_TIME as f32)).collect();
     let times = graph.constant(&part("time"), &[width, 1], &times);
     let exponent = plain(graph, "Mul", "exponent", [&times, &operators.decaying]);
     let decay = graph.node("Exp", &part("decay"), &[&exponent], Vec::new());
