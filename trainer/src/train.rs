@@ -7,7 +7,7 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
 use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split};
 use crate::events::{TrainEvent, TrainObserver};
-use crate::network::NetworkOptions;
+use crate::network::{Network, NetworkOptions};
 use crate::plot::History;
 use crate::precompute::{PrepareError, PrepareOptions, PreparedShape, prepare};
 use crate::sampler::{Sampler, SamplerError};
@@ -82,6 +82,18 @@ pub enum TrainError {
         /// Its value here.
         wanted: String,
     },
+    /// The weights to start from are another network's.
+    #[error(
+        "{path} (--initial) holds the weights of another network: it has {found}, the run {wanted}; set the table network as there"
+    )]
+    OtherNetwork {
+        /// The checkpoint.
+        path: String,
+        /// The network there.
+        found: String,
+        /// The network of this run.
+        wanted: String,
+    },
     /// Validation failed.
     #[error("validation: {0:#}")]
     Validation(anyhow::Error),
@@ -130,7 +142,7 @@ pub fn train(
     let (step, best_error) = resumed.as_ref().map_or((0, f64::INFINITY), |c| (c.step, c.best_error));
     let runner = match resumed {
         Some(checkpoint) => checkpoint.into_runner(device)?,
-        None => StepRunner::new(config.network.build(config.seed, device)?, config.step_options())
+        None => StepRunner::new(initial_network(config, device)?, config.step_options())
             .map_err(|source| TrainError::Step { step: 0, source, checkpoint: "none".into() })?,
     };
     let metrics = open_metrics(&config.out.join(METRICS), step)?;
@@ -221,6 +233,22 @@ pub fn prepare_options(config: &TrainConfig) -> PrepareOptions {
         pool: config.pool,
         seed: config.seed,
     }
+}
+
+/// The network that a new run begins with: of random weights, or of those of the checkpoint that the settings name.
+fn initial_network(config: &TrainConfig, device: &Device) -> Result<Box<dyn Network>, TrainError> {
+    if config.initial.as_os_str().is_empty() {
+        return Ok(config.network.build(config.seed, device)?);
+    }
+    let checkpoint = Checkpoint::read(&config.initial)?;
+    if checkpoint.config.network != config.network {
+        return Err(TrainError::OtherNetwork {
+            path: config.initial.display().to_string(),
+            found: format!("{:?}", checkpoint.config.network),
+            wanted: format!("{:?}", config.network),
+        });
+    }
+    Ok(checkpoint.network(device)?)
 }
 
 /// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may
