@@ -85,6 +85,7 @@ pub mod network;
 pub mod numeric;
 pub mod pipeline;
 pub mod point_map;
+pub mod quality;
 pub mod refine;
 pub mod render;
 pub mod shape;

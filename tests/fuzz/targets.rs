@@ -304,7 +304,7 @@ fn shapes(folder: &Path) -> Target {
 fn maps(name: &str, folder: &Path) -> Target {
     let path = folder.join(name);
     let (targets, confidence) = (vec![1, 0, PointMap::UNMATCHED], Some(vec![0.5, 1.0, 0.0]));
-    write_point_map(&path, &PointMap { targets, confidence, n_target: 2 }).unwrap();
+    write_point_map(&path, &PointMap { targets, confidence, points: None, n_target: 2 }).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let wide: Vec<u8> = [&[0xFF, 0xFE][..], &bytes.iter().flat_map(|&b| [b, 0]).collect::<Vec<_>>()].concat();
     let seeds = if name == "map.npy" { vec![bytes] } else { vec![bytes, wide] };

@@ -127,6 +127,7 @@ pub fn test_metadata(per_shape_statistics: bool) -> ModelMetadata {
         solver: fmap::FmapSolver::Regularized { weight: 0.1 },
         decimate: Some(15_000),
         per_shape_statistics,
+        calibration: None,
         training_set: "none".into(),
         seed: 1,
         steps: 0,

@@ -5,7 +5,7 @@ use super::{
     relative_residual, scale_free_eigenvalues,
 };
 use crate::Matrix;
-use crate::point_map::{Comparison, JointEmbedding, PointMap, RecoverError, recover_by};
+use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::spectral::Eigenbasis;
 
 /// Two functional maps between the same bases, one in each direction.
@@ -56,29 +56,31 @@ impl BothMaps {
     /// other direction is the one of [`BothMaps::reversed`].
     ///
     /// # Errors
-    /// As [`recover_by`].
+    /// As [`Embedding::forth`].
     pub fn point_map(
         &self,
         comparison: Comparison,
         basis_source: &Eigenbasis,
         basis_target: &Eigenbasis,
     ) -> Result<PointMap, RecoverError> {
-        match comparison {
-            Comparison::Joint => self.embedding(basis_source, basis_target)?.forth(),
-            one_map => recover_by(one_map, &self.forth, basis_source, basis_target),
-        }
+        self.embedding(comparison, basis_source, basis_target)?.forth()
     }
 
-    /// The embedding in which the vertices of both shapes are compared.
+    /// The embedding in which the vertices of both shapes are compared: by [`Comparison::Joint`] that of both maps, else of `forth`
+    /// alone.
     ///
     /// # Errors
-    /// As [`JointEmbedding::new`].
+    /// As [`Embedding::joint`].
     pub fn embedding(
         &self,
+        comparison: Comparison,
         basis_source: &Eigenbasis,
         basis_target: &Eigenbasis,
-    ) -> Result<JointEmbedding, RecoverError> {
-        JointEmbedding::new(&self.forth, &self.back, basis_source, basis_target)
+    ) -> Result<Embedding, RecoverError> {
+        match comparison {
+            Comparison::Joint => Embedding::joint(&self.forth, &self.back, basis_source, basis_target),
+            one_map => Embedding::of_one(one_map, &self.forth, basis_source, basis_target),
+        }
     }
 }
 

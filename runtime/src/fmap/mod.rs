@@ -55,7 +55,7 @@ pub enum FmapSolver {
         weight: f64,
     },
     /// The regularised solves of both directions, both kept, [`functional_maps`]: vertices are compared in the
-    /// [`crate::point_map::JointEmbedding`].
+    /// [`crate::point_map::Embedding`].
     Joint {
         /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
         weight: f64,

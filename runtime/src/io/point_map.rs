@@ -168,7 +168,7 @@ fn no_such_target(index: i64, base: i64, n_target: Option<usize>) -> String {
 fn finish(targets: Vec<u32>, confidence: Option<Vec<f32>>, n_target: Option<usize>) -> PointMap {
     let largest = targets.iter().filter(|&&t| t != PointMap::UNMATCHED).max();
     let n_target = n_target.unwrap_or(largest.map_or(0, |&t| t as usize + 1));
-    PointMap { targets, confidence, n_target }
+    PointMap { targets, confidence, points: None, n_target }
 }
 
 fn decode_csv(bytes: &[u8], n_target: Option<usize>) -> Parsed<PointMap> {
@@ -290,6 +290,7 @@ mod tests {
         PointMap {
             targets: vec![2, PointMap::UNMATCHED, 0],
             confidence: Some(vec![0.5, 0.0, 1.0]),
+            points: None,
             n_target: 4,
         }
     }

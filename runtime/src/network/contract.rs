@@ -8,6 +8,7 @@ use super::NetworkError;
 use super::proto::{Model, Type, ValueInfo};
 use crate::descriptor::ShotOptions;
 use crate::fmap::FmapSolver;
+use crate::quality::Calibration;
 use prost::Message;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -157,6 +158,8 @@ pub struct ModelMetadata {
     pub commit: String,
     /// Licence of the weights.
     pub license: String,
+    /// What turns the measures of a map by this model into an estimate of its error; models may lack it.
+    pub calibration: Option<Calibration>,
 }
 
 impl ModelMetadata {
@@ -185,7 +188,8 @@ impl ModelMetadata {
             ("commit", self.commit.clone()),
             ("license", self.license.clone()),
         ];
-        pairs.into_iter().map(|(key, value)| (format!("{PREFIX}{key}"), value)).collect()
+        let calibration = self.calibration.map(|calibration| ("calibration", calibration.to_json()));
+        pairs.into_iter().chain(calibration).map(|(key, value)| (format!("{PREFIX}{key}"), value)).collect()
     }
 
     fn from_pairs(pairs: &Pairs) -> Result<Self, NetworkError> {
@@ -224,6 +228,7 @@ impl ModelMetadata {
             steps: pairs.value("steps")?,
             commit: pairs.text("commit")?.to_string(),
             license: pairs.text("license")?.to_string(),
+            calibration: pairs.calibration()?,
         };
         metadata.check().map_err(|reason| pairs.contract(reason))?;
         Ok(metadata)
@@ -274,6 +279,13 @@ impl Pairs<'_> {
             .get(&key)
             .map(String::as_str)
             .ok_or_else(|| self.contract(format!("no {key} in the metadata; {EXPORT}")))
+    }
+
+    fn calibration(&self) -> Result<Option<Calibration>, NetworkError> {
+        let key = format!("{PREFIX}calibration");
+        let Some(text) = self.values.get(&key) else { return Ok(None) };
+        let read = Calibration::from_json(text);
+        read.map(Some).map_err(|reason| self.contract(format!("{key} {reason}; export the model anew")))
     }
 
     fn value<T: FromStr>(&self, key: &str) -> Result<T, NetworkError> {
@@ -372,6 +384,7 @@ impl ModelMetadata {
             solver: FmapSolver::LeastSquares,
             decimate: None,
             per_shape_statistics: false,
+            calibration: None,
             training_set: String::new(),
             seed: 0,
             steps: 0,

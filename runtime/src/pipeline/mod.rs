@@ -3,13 +3,16 @@
 //! ```text
 //! each shape:  repair -> decimate                                          (Shape::new)
 //!              -> quantities that the descriptor asks for -> descriptor    (Matcher::describe)
-//! a pair:      functional maps -> point map -> refine -> upscale           (Matcher::match_shapes)
-//!              -> the map in the input's vertices
+//! a pair:      functional maps -> point maps -> refine -> judge            (Matcher::match_shapes)
+//!              -> other candidates, where the map is doubtful
+//!              -> points on the target's surface -> the inputs' vertices
 //! ```
 //!
-//! Refinement comes before upscaling: it needs many iterations, which are cheap on the decimated shapes.
+//! All is done on the decimated shapes; only the last step sees the full ones.
 
+mod candidates;
 mod descriptor;
+mod finish;
 mod options;
 mod pair;
 
@@ -20,6 +23,7 @@ use crate::events::{Event, Observer};
 use crate::fmap::{FmapInfo, FmapSolver};
 use crate::network::DescriptorNetwork;
 use crate::point_map::PointMap;
+use crate::quality::{Calibration, Estimate, Quality};
 use crate::refine::PmfInfo;
 use crate::shape::{Context, Shape, ShapeOptions};
 use crate::upscale::AdmmInfo;
@@ -27,8 +31,9 @@ use crate::{Matrix, Mesh};
 use pair::Pair;
 use std::path::Path;
 
+pub use candidates::Candidate;
 pub use descriptor::{Descriptor, NetworkDescriptor};
-pub use options::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
+pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
 const SHOT_K: usize = 120;
@@ -49,8 +54,8 @@ pub struct DescribedShape {
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Match {
-    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source; those that repair dropped are
-    /// unmatched.
+    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source, and its point on the target's surface;
+    /// vertices of no face are unmatched. The confidence is what [`crate::quality::doubt`] leaves.
     pub map: PointMap,
     /// The functional map of the working meshes, `[k, k]` (target x source), before refinement; between bases at unit area
     /// ([`Shape::unit_basis`]).
@@ -59,8 +64,14 @@ pub struct Match {
     pub functional_map_info: FmapInfo,
     /// How the product manifold filter went, where it ran.
     pub pmf_info: Option<PmfInfo>,
-    /// How the upscaling went, where there was one.
+    /// How the upscaling by a functional map went, where there was one.
     pub upscale_info: Option<AdmmInfo>,
+    /// Measures of the map of the working meshes, without ground truth.
+    pub quality: Quality,
+    /// What they say of its error.
+    pub estimate: Estimate,
+    /// The ways to a map that were tried.
+    pub candidates: Vec<Candidate>,
 }
 
 /// Matches shapes; loads the model once.
@@ -75,6 +86,8 @@ pub struct Matcher {
     /// What was asked for; `None`: what suits the solver.
     refinement: Option<Refinement>,
     upscaling: Upscaling,
+    effort: Effort,
+    calibration: Calibration,
     shot: ShotOptions,
     network: Option<NetworkDescriptor>,
     cache: Option<Cache>,
@@ -113,6 +126,8 @@ impl Matcher {
             part_solver: FmapSolver::for_part(options.solver),
             refinement: options.refinement.or(by_default),
             upscaling: options.upscaling,
+            effort: options.effort,
+            calibration: metadata.and_then(|m| m.calibration).unwrap_or_default(),
             shot,
             network: network.map(|network| NetworkDescriptor { network, shot }),
             cache: options.cache.as_deref().map(Cache::open).transpose()?,
@@ -142,6 +157,11 @@ impl Matcher {
     /// What refines the maps of whole shapes, or of a part and its whole.
     pub fn refinement(&self, is_part: bool) -> Refinement {
         self.refinement.unwrap_or_else(|| Refinement::suiting(self.solver(is_part)))
+    }
+
+    /// What turns the measures of a map into an estimate of its error.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
     }
 
     /// The model, unless descriptors are SHOT.

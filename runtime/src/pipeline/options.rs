@@ -64,11 +64,27 @@ impl Refinement {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Upscaling {
-    /// The robust l2,1 problem of the paper.
+    /// Along the surface: a vertex of the full source goes where its place on the decimated one goes. Maps that come from no
+    /// functional map, those of the product manifold filter, take the l2,1 problem instead.
     #[default]
+    Surface,
+    /// The robust l2,1 problem of the paper.
     L21,
     /// Plain least squares, which wrong matches bend.
     LeastSquares,
+}
+
+/// How much is tried to find a good map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Effort {
+    /// One way to the map.
+    Low,
+    /// Others where the first map is doubtful.
+    #[default]
+    Normal,
+    /// All of them, always.
+    High,
 }
 
 /// Which model computes the descriptors.
@@ -103,8 +119,10 @@ pub struct MatchOptions {
     pub decimate: Option<Option<usize>>,
     /// Refinement. Default: what suits the solver, [`Refinement::suiting`]; none for SHOT.
     pub refinement: Option<Refinement>,
-    /// Upscaling of the map of decimated meshes. Default: the l2,1 problem.
+    /// Upscaling of the map of decimated meshes. Default: along the surface.
     pub upscaling: Upscaling,
+    /// How much is tried to find a good map. Default: other ways where the first map is doubtful.
+    pub effort: Effort,
     /// Folder of results kept for each shape; `None`, the default: nothing is kept.
     pub cache: Option<PathBuf>,
 }

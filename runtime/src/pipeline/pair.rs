@@ -1,23 +1,23 @@
-//! A pair on its way through the stages: functional maps, point map, refinement, upscaling.
+//! A pair on its way through the stages: functional maps, point map, refinement, judgement, the inputs' vertices.
 
+use super::candidates::{Start, Tried};
+use super::finish::{full_by_functional_map, on_inputs};
 use super::{DescribedShape, Match, Matcher, Refinement, Upscaling};
 use crate::error::Error;
 use crate::events::{Event, timed};
-use crate::fmap::{BothMaps, FmapSolver, functional_maps};
+use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
-use crate::point_map::PointMap;
+use crate::point_map::{Comparison, Embedding, PointMap};
+use crate::quality::{Estimate, Quality, Side, SurfaceFrame, doubt};
 use crate::refine::{
     IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletOptions, ZoomOutOptions, icp, pmf, wavelet, zoomout,
 };
-use crate::shape::{Context, WayBack};
-use crate::spectral::Eigenbasis;
-use crate::upscale::{
-    AdmmInfo, AdmmOptions, delta_coefficients, full_point_map, l21_functional_map,
-    least_squares_functional_map,
-};
+use crate::shape::Context;
+use crate::spectral::{Eigenbasis, Laplacian};
+use std::sync::Arc;
 
-/// Eigenfunctions of the full meshes in upscaling.
-const UPSCALE_K: usize = 100;
+/// Eigenfunctions that quality is measured with, at least, where a shape has them.
+const QUALITY_K: usize = 30;
 
 pub(super) struct Pair<'a> {
     pub(super) matcher: &'a Matcher,
@@ -28,111 +28,191 @@ pub(super) struct Pair<'a> {
     pub(super) context: Context<'a>,
 }
 
-/// A functional map's point map before refinement.
-struct Start {
-    maps: BothMaps,
-    solver: FmapSolver,
-    /// At the functional map's `k`, unit area.
+/// A map between the working meshes, both ways where both are known.
+pub(super) struct Found {
+    pub(super) map: PointMap,
+    pub(super) back: Option<PointMap>,
+    /// The space that it was found in; none where it comes from no functional map.
+    pub(super) embedding: Option<Embedding>,
+    pub(super) pmf_info: Option<PmfInfo>,
+}
+
+impl Found {
+    fn in_embedding(map: PointMap, back: Option<PointMap>, embedding: Embedding) -> Self {
+        Self { map, back, embedding: Some(embedding), pmf_info: None }
+    }
+}
+
+/// What judges maps of a pair.
+pub(super) struct Judge<'a> {
+    pair: &'a Pair<'a>,
     bases: [Eigenbasis; 2],
-    raw: PointMap,
+    laplacians: [Arc<Laplacian>; 2],
+    frames: [SurfaceFrame; 2],
+}
+
+impl Judge<'_> {
+    fn sides(&self) -> [Side<'_>; 2] {
+        let shapes = [&self.pair.source.shape, &self.pair.target.shape];
+        std::array::from_fn(|i| Side {
+            mesh: shapes[i].mesh(),
+            laplacian: &self.laplacians[i],
+            basis: &self.bases[i],
+            frame: &self.frames[i],
+        })
+    }
+
+    /// The measures of a map and what they say of its error.
+    pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
+        let [source, target] = self.sides();
+        let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
+        Ok((quality, self.pair.matcher.calibration().estimate(&quality)))
+    }
+
+    fn doubt(&self, found: &Found) -> Vec<f32> {
+        let [source, target] = self.sides();
+        doubt(&found.map, found.back.as_ref(), source, target)
+    }
 }
 
 impl Pair<'_> {
     pub(super) fn run(&self) -> Result<Match, Error> {
         let (matcher, is_part) = (self.matcher, self.is_part());
-        let (source, target) = (&self.source.shape, &self.target.shape);
         let solver = matcher.solver(is_part);
-        let refinement = matcher.refinement(is_part);
-        let refined_k = self.source.refined_k.min(self.target.refined_k);
         let bases = self.bases(matcher.k)?;
-        let (maps, functional_map_info) = self.timed("functional map", || {
-            let f = bases[0].project(&self.source.descriptors);
-            let g = bases[1].project(&self.target.descriptors);
-            functional_maps(&bases[0], &bases[1], &f, &g, solver)
-        })?;
-        if functional_map_info.rank < matcher.k {
-            self.warn(&format!(
-                "the descriptors determine only {} of {} dimensions of the functional map",
-                functional_map_info.rank, matcher.k
-            ));
-        }
-        let is_joint = matches!(solver, FmapSolver::Joint { .. }) || refinement == Refinement::Wavelet;
-        let width = refined_k.max(matcher.k) * if is_joint { 2 } else { 1 };
-        let needed = memory::search_bytes(source.n(), target.n(), width);
+        let (maps, info) = self.functional_maps(&bases, solver)?;
+        let refinement = matcher.refinement(is_part);
+        let width = self.refined_k().max(matcher.k) * 2;
+        let [n_source, n_target] = [&self.source.shape, &self.target.shape].map(|shape| shape.n());
+        let needed = memory::search_bytes(n_source, n_target, width);
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
-        let raw = self.timed("point map", || maps.point_map(solver.comparison(), &bases[0], &bases[1]))?;
-        let (map, pmf_info) =
-            self.refine(refinement, refined_k, &Start { maps: maps.clone(), solver, bases, raw })?;
+        let start = self.timed("point map", || self.start(&maps, solver.comparison(), &bases))?;
+        let found = self.refine(refinement, &start)?;
+        let judge = self.timed("quality", || self.judge())?;
+        let tried = self.with_candidates(&judge, &start, found)?;
+        let Tried { found, quality, estimate, candidates } = tried;
         drop(reserved);
-        let (map, upscale_info) = self.upscale(map)?;
-        let map = in_input_vertices(&source.way_back, &target.way_back, &map);
-        Ok(Match { map, functional_map: maps.forth, functional_map_info, pmf_info, upscale_info })
+        self.say_what_looks_wrong(&quality, &estimate);
+        let doubt = judge.doubt(&found);
+        let (map, upscale_info) = self.on_inputs(&found, &doubt)?;
+        Ok(Match {
+            map,
+            functional_map: maps.forth,
+            functional_map_info: info,
+            pmf_info: found.pmf_info,
+            upscale_info,
+            quality,
+            estimate,
+            candidates,
+        })
     }
 
-    fn is_part(&self) -> bool {
+    pub(super) fn is_part(&self) -> bool {
         self.source.shape.whole_area.is_some()
     }
 
-    fn timed<T>(&self, stage: &'static str, run: impl FnOnce() -> T) -> T {
+    pub(super) fn timed<T>(&self, stage: &'static str, run: impl FnOnce() -> T) -> T {
         timed(self.context.observer, self.names, stage, run)
     }
 
-    fn warn(&self, text: &str) {
+    pub(super) fn warn(&self, text: &str) {
         (self.context.observer)(Event::Warning(format!("{}: {text}", self.names)));
     }
 
     /// The bases of source and target, `k` eigenfunctions at unit area.
-    fn bases(&self, k: usize) -> Result<[Eigenbasis; 2], Error> {
+    pub(super) fn bases(&self, k: usize) -> Result<[Eigenbasis; 2], Error> {
         let of = |described: &DescribedShape| described.shape.unit_basis(k, self.context);
         Ok([of(self.source)?, of(self.target)?])
     }
 
-    /// Refines up to `k` eigenfunctions.
-    fn refine(
+    /// Eigenfunctions that refinement goes up to.
+    pub(super) fn refined_k(&self) -> usize {
+        self.source.refined_k.min(self.target.refined_k)
+    }
+
+    fn functional_maps(
         &self,
-        refinement: Refinement,
-        k: usize,
-        start: &Start,
-    ) -> Result<(PointMap, Option<PmfInfo>), Error> {
-        Ok(match refinement {
-            Refinement::None => (start.raw.clone(), None),
-            Refinement::Icp => {
-                let [source, target] = &start.bases;
-                let refine = || icp(&start.maps.forth, source, target, &IcpOptions::default());
-                (self.timed("icp", refine)?.map, None)
+        bases: &[Eigenbasis; 2],
+        solver: FmapSolver,
+    ) -> Result<(BothMaps, FmapInfo), Error> {
+        let (maps, info) = self.timed("functional map", || {
+            let f = bases[0].project(&self.source.descriptors);
+            let g = bases[1].project(&self.target.descriptors);
+            functional_maps(&bases[0], &bases[1], &f, &g, solver)
+        })?;
+        if info.rank < self.matcher.k {
+            self.warn(&format!(
+                "the descriptors determine only {} of {} dimensions of the functional map",
+                info.rank, self.matcher.k
+            ));
+        }
+        Ok((maps, info))
+    }
+
+    /// The point maps of functional maps.
+    pub(super) fn start(
+        &self,
+        maps: &BothMaps,
+        comparison: Comparison,
+        bases: &[Eigenbasis; 2],
+    ) -> Result<Start, Error> {
+        let embedding = maps.embedding(comparison, &bases[0], &bases[1])?;
+        if comparison == Comparison::Joint {
+            let [map, back] = embedding.both()?;
+            return Ok(Start { functional_map: maps.forth.clone(), map, back, embedding });
+        }
+        let map = embedding.forth()?;
+        let back = maps.clone().reversed().point_map(comparison, &bases[1], &bases[0])?;
+        Ok(Start { functional_map: maps.forth.clone(), map, back, embedding })
+    }
+
+    /// Refines a start up to [`Pair::refined_k`] eigenfunctions.
+    pub(super) fn refine(&self, refinement: Refinement, start: &Start) -> Result<Found, Error> {
+        match refinement {
+            Refinement::None => {
+                let (map, back) = (start.map.clone(), (!self.is_part()).then(|| start.back.clone()));
+                Ok(Found::in_embedding(map, back, start.embedding.clone()))
             }
-            Refinement::Zoomout => (self.zoomout(start, k)?, None),
-            Refinement::Wavelet => (self.wavelet(start, k)?, None),
+            Refinement::Icp => self.icp(start),
+            Refinement::Zoomout => self.zoomout(start),
+            Refinement::Wavelet => {
+                let options = WaveletOptions { part: self.is_part(), ..WaveletOptions::at(self.refined_k()) };
+                self.wavelet(start, &options)
+            }
             Refinement::Pmf | Refinement::SharedTriangulation => {
-                let (map, info) = self.product_manifold_filter(refinement, start, k)?;
-                (map, Some(info))
+                self.product_manifold_filter(refinement, start)
             }
-        })
+        }
     }
 
-    fn zoomout(&self, start: &Start, k: usize) -> Result<PointMap, Error> {
-        let [source, target] = self.bases(k)?;
+    fn icp(&self, start: &Start) -> Result<Found, Error> {
+        let [source, target] = self.bases(self.matcher.k)?;
+        let refine = || icp(&start.functional_map, &source, &target, &IcpOptions::default());
+        let refined = self.timed("icp", refine)?;
+        let embedding = Embedding::of_one(Comparison::Distance, &refined.functional_map, &source, &target)?;
+        Ok(Found::in_embedding(refined.map, None, embedding))
+    }
+
+    fn zoomout(&self, start: &Start) -> Result<Found, Error> {
+        let [source, target] = self.bases(self.refined_k())?;
         let options = ZoomOutOptions { part: self.is_part(), ..ZoomOutOptions::default() };
-        Ok(self.timed("zoomout", || zoomout(&start.raw, &source, &target, &options))?.map)
+        let refined = self.timed("zoomout", || zoomout(&start.map, &source, &target, &options))?;
+        let c = &refined.functional_map;
+        // A part has fewer eigenfunctions.
+        let (source, target) = (source.truncated(c.cols()), target.truncated(c.rows()));
+        let embedding = Embedding::of_one(Comparison::Adjoint, c, &source, &target)?;
+        Ok(Found::in_embedding(refined.map, None, embedding))
     }
 
-    fn wavelet(&self, start: &Start, k: usize) -> Result<PointMap, Error> {
-        let options = WaveletOptions { part: self.is_part(), ..WaveletOptions::between(self.matcher.k, k) };
-        let [source, target] = self.bases(k)?;
-        self.timed("wavelet", || {
-            let back = start.maps.clone().reversed();
-            let back = back.point_map(start.solver.comparison(), &start.bases[1], &start.bases[0])?;
-            Ok(wavelet([&start.raw, &back], &source, &target, &options)?.map)
-        })
+    pub(super) fn wavelet(&self, start: &Start, options: &WaveletOptions) -> Result<Found, Error> {
+        let [source, target] = self.bases(self.refined_k())?;
+        let refined =
+            self.timed("wavelet", || wavelet([&start.map, &start.back], &source, &target, options))?;
+        Ok(Found::in_embedding(refined.map, Some(refined.map_back), refined.embedding))
     }
 
-    fn product_manifold_filter(
-        &self,
-        refinement: Refinement,
-        start: &Start,
-        k: usize,
-    ) -> Result<(PointMap, PmfInfo), Error> {
-        let start = self.zoomout(start, k)?;
+    fn product_manifold_filter(&self, refinement: Refinement, start: &Start) -> Result<Found, Error> {
+        let start = self.zoomout(start)?.map;
         let follows = refinement == Refinement::SharedTriangulation;
         // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
         let shot = |described: &DescribedShape| described.shape.shot(&self.matcher.shot, self.context);
@@ -141,53 +221,56 @@ impl Pair<'_> {
             descriptors: Some([&shot_source, &shot_target]),
             meshes: follows.then(|| [self.source.shape.mesh(), self.target.shape.mesh()]),
         };
-        let [source, target] = self.bases(k)?;
+        let [source, target] = self.bases(self.refined_k())?;
         let filtered = self.timed("pmf", || pmf(&start, &source, &target, hints, &PmfOptions::default()))?;
         if follows && filtered.info.edges_kept.is_none() {
             self.warn(
                 "the meshes are not triangulated alike; the map is that of the product manifold filter",
             );
         }
-        Ok((filtered.map, filtered.info))
+        Ok(Found { map: filtered.map, back: None, embedding: None, pmf_info: Some(filtered.info) })
     }
 
-    /// From the working meshes to the full ones, where they differ.
-    fn upscale(&self, map: PointMap) -> Result<(PointMap, Option<AdmmInfo>), Error> {
-        let (source, target) = (&self.source.shape, &self.target.shape);
-        if !source.is_decimated() && !target.is_decimated() {
-            return Ok((map, None));
+    fn judge(&self) -> Result<Judge<'_>, Error> {
+        let shapes = [&self.source.shape, &self.target.shape];
+        let k = QUALITY_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
+        Ok(Judge {
+            pair: self,
+            bases: self.bases(k)?,
+            laplacians: shapes.map(|shape| shape.laplacian()),
+            frames: shapes.map(|shape| SurfaceFrame::new(shape.mesh())),
+        })
+    }
+
+    fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate) {
+        if quality.is_mirrored() {
+            self.warn(&format!(
+                "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
+                100.0 * quality.reversed
+            ));
+        } else if estimate.doubtful {
+            self.warn(&format!(
+                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try --effort high, --landmarks or --adapt",
+                estimate.expected_error,
+                quality.complaint()
+            ));
         }
-        let full_source = source.full_basis(UPSCALE_K, self.context)?;
-        let full_target = target.full_basis(UPSCALE_K, self.context)?;
-        let full = |i: usize| {
-            let target_vertex = target.way_back.full_of_work(map.get(i)?);
-            Some((source.way_back.full_of_work(i as u32), target_vertex))
-        };
-        let matches: Vec<(u32, u32)> = (0..map.len()).filter_map(full).collect();
-        let (phi, psi) = delta_coefficients(&full_source, &full_target, &matches);
-        let (full_map, info) = self.timed("upscale", || match self.matcher.upscaling {
-            Upscaling::L21 => {
-                l21_functional_map(&phi, &psi, &AdmmOptions::default()).map(|(c, info)| (c, Some(info)))
-            }
-            Upscaling::LeastSquares => least_squares_functional_map(&phi, &psi).map(|c| (c, None)),
-        })?;
-        let map = self.timed("full point map", || {
-            let vertices = source.full_mesh.vertices();
-            full_point_map(&full_map, &full_source, &full_target, vertices, &matches)
-        })?;
-        Ok((map, info))
     }
-}
 
-/// Takes a map of the full repaired meshes to the vertices of the input meshes.
-fn in_input_vertices(source: &WayBack, target: &WayBack, map: &PointMap) -> PointMap {
-    let full: Vec<Option<usize>> =
-        source.full_of_input.iter().map(|&v| (v != WayBack::NONE).then_some(v as usize)).collect();
-    let target_of = |v: &Option<usize>| {
-        v.and_then(|v| map.get(v)).map_or(PointMap::UNMATCHED, |t| target.input_of_full[t as usize])
-    };
-    let confidence =
-        map.confidence.as_ref().map(|values| full.iter().map(|v| v.map_or(0.0, |v| values[v])).collect());
-    let n_target = target.full_of_input.len();
-    PointMap { targets: full.iter().map(target_of).collect(), confidence, n_target }
+    /// From the working meshes to the inputs.
+    fn on_inputs(
+        &self,
+        found: &Found,
+        doubt: &[f32],
+    ) -> Result<(PointMap, Option<crate::upscale::AdmmInfo>), Error> {
+        let (source, target) = (&self.source.shape, &self.target.shape);
+        let decimated = source.is_decimated() || target.is_decimated();
+        match (&found.embedding, self.matcher.upscaling) {
+            (Some(embedding), upscaling) if !decimated || upscaling == Upscaling::Surface => {
+                let map = self.timed("surface points", || on_inputs(source, target, &found.map, embedding, doubt));
+                Ok((map, None))
+            }
+            (_, upscaling) => full_by_functional_map(self, &found.map, upscaling, doubt),
+        }
+    }
 }

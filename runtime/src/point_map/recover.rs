@@ -1,7 +1,7 @@
 //! The point map of a functional map.
 
 use super::search::{SearchError, nearest_rows};
-use super::{JointEmbedding, PointMap};
+use super::{Embedding, PointMap};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
 use faer::{Accum, Par};
@@ -22,7 +22,7 @@ pub enum Comparison {
     /// are shortened, the query keeps its length. On FAUST pairs the mean error of the raw bidirectional maps is 1.1 instead
     /// of 1.3.
     Adjoint,
-    /// The sum of both squares, in the [`super::JointEmbedding`] of the functional maps of both directions; of one map, with its
+    /// The sum of both squares, in the [`super::Embedding`] of the functional maps of both directions; of one map, with its
     /// adjoint as the other.
     Joint,
 }
@@ -105,16 +105,7 @@ pub fn recover_by(
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
 ) -> Result<PointMap, RecoverError> {
-    check_shape(c, basis_source, basis_target)?;
-    let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
-    let (targets, confidence) = match comparison {
-        Comparison::Joint => {
-            return JointEmbedding::new(c, &c.transposed(), basis_source, basis_target)?.forth();
-        }
-        Comparison::Distance => nearest_with_cosine(&transport(phi, c), psi)?,
-        Comparison::Adjoint => nearest_with_cosine(phi, &transport(psi, &c.transposed()))?,
-    };
-    Ok(PointMap { targets, confidence: Some(confidence), n_target: basis_target.n() })
+    Embedding::of_one(comparison, c, basis_source, basis_target)?.forth()
 }
 
 /// Checks that `c` is `[k_target, k_source]`.
@@ -136,7 +127,7 @@ pub(crate) fn recover_transported(
     basis_target: &Eigenbasis,
 ) -> Result<PointMap, RecoverError> {
     let (targets, confidence) = nearest_with_cosine(transported, &basis_target.eigenvectors)?;
-    Ok(PointMap { targets, confidence: Some(confidence), n_target: basis_target.n() })
+    Ok(PointMap { targets, confidence: Some(confidence), points: None, n_target: basis_target.n() })
 }
 
 /// For each query the nearest row, and the cosine of the angle between the two.

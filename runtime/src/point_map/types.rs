@@ -1,4 +1,6 @@
-//! A map from vertices to vertices.
+//! A map from vertices to vertices, or to points on the surface.
+
+use crate::mesh::SurfacePoint;
 
 /// A point map `T: source -> target`: for each source vertex a target vertex, or none.
 #[derive(Clone, Debug, PartialEq)]
@@ -7,6 +9,9 @@ pub struct PointMap {
     pub targets: Vec<u32>,
     /// How far each match can be trusted, `[n_source]`, from 0 to 1; `None` where that is not known.
     pub confidence: Option<Vec<f32>>,
+    /// The point on the target's surface that each source vertex goes to, `[n_source]`, finer than its vertex; none where a vertex
+    /// has no match. `None` where the map is not known finer than to a vertex.
+    pub points: Option<Vec<Option<SurfacePoint>>>,
     /// Number of target vertices.
     pub n_target: usize,
 }
@@ -17,7 +22,7 @@ impl PointMap {
 
     /// A map without confidences.
     pub fn new(targets: Vec<u32>, n_target: usize) -> Self {
-        Self { targets, confidence: None, n_target }
+        Self { targets, confidence: None, points: None, n_target }
     }
 
     /// Number of source vertices.

@@ -11,7 +11,7 @@ use super::zoomout::least_squares_map;
 use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
-use crate::point_map::PointMap;
+use crate::point_map::{Comparison, Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
 
@@ -27,14 +27,14 @@ pub struct WaveletStage {
 /// Options of [`wavelet`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveletOptions {
-    /// From coarse to fine. At least one; default 5 rounds at 60 eigenfunctions, 3 at 128, 2 at 200.
+    /// One after the other. At least one; default 3 rounds at 200 eigenfunctions.
     pub stages: Vec<WaveletStage>,
     /// Whether the source is a part of the target, which is refused: a part has no map back from all of the target. Default
     /// false.
     pub part: bool,
 }
 
-const STAGES: [WaveletStage; 3] = [
+const COARSE_TO_FINE: [WaveletStage; 3] = [
     WaveletStage { k: 60, rounds: 5 },
     WaveletStage { k: 128, rounds: 3 },
     WaveletStage { k: 200, rounds: 2 },
@@ -42,21 +42,27 @@ const STAGES: [WaveletStage; 3] = [
 
 impl Default for WaveletOptions {
     fn default() -> Self {
-        Self { stages: STAGES.to_vec(), part: false }
+        Self::at(200)
     }
 }
 
 impl WaveletOptions {
-    /// The default stages from `k_start`, the eigenfunctions that the initial map was found with, up to `k_max`: the first is at
-    /// `k_start` if it is below the default's, the last at `k_max`.
-    pub fn between(k_start: usize, k_max: usize) -> Self {
-        let mut stages: Vec<WaveletStage> = STAGES.into_iter().filter(|stage| stage.k < k_max).collect();
-        if k_start < STAGES[0].k.min(k_max) {
-            stages.insert(0, WaveletStage { k: k_start, ..STAGES[0] });
+    /// Three rounds at `k` eigenfunctions: for a start that is right up to details.
+    pub fn at(k: usize) -> Self {
+        Self { stages: vec![WaveletStage { k, rounds: 3 }], part: false }
+    }
+
+    /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 5 rounds at 60, 3 at 128, 2 at 200. For a start of
+    /// which only the rough is right; what it has of details gets lost.
+    pub fn coarse_to_fine(k_start: usize, k_max: usize) -> Self {
+        let mut stages: Vec<WaveletStage> =
+            COARSE_TO_FINE.into_iter().filter(|stage| stage.k < k_max).collect();
+        if k_start < COARSE_TO_FINE[0].k.min(k_max) {
+            stages.insert(0, WaveletStage { k: k_start, ..COARSE_TO_FINE[0] });
         }
-        let rounds = STAGES[if stages.is_empty() { 0 } else { STAGES.len() - 1 }].rounds;
+        let rounds = COARSE_TO_FINE[if stages.is_empty() { 0 } else { COARSE_TO_FINE.len() - 1 }].rounds;
         stages.push(WaveletStage { k: k_max, rounds });
-        Self { stages, ..Self::default() }
+        Self { stages, part: false }
     }
 }
 
@@ -76,6 +82,8 @@ pub struct RefinedBoth<Info> {
     pub map_back: PointMap,
     /// The functional maps that they were recovered from.
     pub functional_maps: BothMaps,
+    /// The embedding in which the vertices were compared.
+    pub embedding: Embedding,
     /// What the refinement did.
     pub info: Info,
 }
@@ -84,11 +92,11 @@ pub struct RefinedBoth<Info> {
 /// filtered functional maps while the number of eigenfunctions grows.
 ///
 /// A round takes the functional maps that the point maps pull functions back by, `C12 = Psi^T A_target Phi[T21]` and
-/// `C21 = Phi^T A_source Psi[T12]`, filters both, and matches every vertex anew in their [`crate::point_map::JointEmbedding`]. The bases must be
+/// `C21 = Phi^T A_source Psi[T12]`, filters both, and matches every vertex anew in their [`crate::point_map::Embedding`]. The bases must be
 /// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
 /// cosine of the angle between the two rows of the embedding.
 ///
-/// Rounds before the last compare distances in single precision where the shapes are small.
+/// Distances are compared in single precision where the shapes are small, as [`crate::point_map::Embedding::both`] does.
 ///
 /// # Errors
 /// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map does not fit the bases or matches
@@ -115,12 +123,12 @@ pub fn wavelet(
     let mut truncated = bases.map(|basis| basis.truncated(rounds[0]));
     for &k in &rounds[..last] {
         let maps = filtered_maps(&images, &mut truncated, bases, k)?;
-        images = maps.embedding(&truncated[0], &truncated[1])?.both()?;
+        images = maps.embedding(Comparison::Joint, &truncated[0], &truncated[1])?.matches()?;
     }
     let functional_maps = filtered_maps(&images, &mut truncated, bases, rounds[last])?;
-    let embedding = functional_maps.embedding(&truncated[0], &truncated[1])?;
-    let (map, map_back) = rayon::join(|| embedding.forth(), || embedding.back());
-    Ok(RefinedBoth { map: map?, map_back: map_back?, functional_maps, info: WaveletInfo { rounds } })
+    let embedding = functional_maps.embedding(Comparison::Joint, &truncated[0], &truncated[1])?;
+    let [map, map_back] = embedding.both()?;
+    Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds } })
 }
 
 /// The filtered functional maps, `[k, k]`, of a pair of point maps, between bases that are cut to `k` where they are not.

@@ -11,7 +11,9 @@ mod way_back;
 use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::error::Error;
 use crate::events::{Observer, timed};
-use crate::mesh::{DecimateOptions, Mesh, RepairOptions, decimate, repair};
+use crate::mesh::{
+    DecimateOptions, Mesh, RepairOptions, SurfacePoint, carried_points, decimate, repair, vertices_on_surface,
+};
 use quantities::Store;
 use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
@@ -67,6 +69,8 @@ pub struct Shape {
     pub full_mesh: Mesh,
     /// The decimated mesh, `[n]` vertices; absent for small meshes.
     decimated: Option<Mesh>,
+    /// The mesh as it was read, where repair changed it.
+    input: Option<Mesh>,
     /// From the vertices of the meshes to the input's and back.
     pub way_back: WayBack,
     /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]), in squared units of the mesh.
@@ -81,6 +85,7 @@ impl Clone for Shape {
             name: self.name.clone(),
             full_mesh: self.full_mesh.clone(),
             decimated: self.decimated.clone(),
+            input: self.input.clone(),
             way_back: self.way_back.clone(),
             whole_area: self.whole_area,
             key: self.key,
@@ -89,8 +94,11 @@ impl Clone for Shape {
     }
 }
 
+/// A point of one of a shape's meshes is not farther from its place on another than this, relative to sqrt(area).
+const CARRIED_WITHIN: f64 = 0.05;
+
 /// Raise where repair or decimation give another mesh.
-const MESH_VERSION: u32 = 1;
+const MESH_VERSION: u32 = 3;
 
 impl Shape {
     /// Repairs and, where it is larger than the options say, decimates a mesh as read; `name` is for messages.
@@ -125,7 +133,8 @@ impl Shape {
             way_back.full_of_work = Some(result.injection);
             decimated = Some(result.mesh);
         }
-        let shape = Self::assemble(name, options, key, full_mesh, decimated, way_back);
+        let input = (full_mesh != *mesh).then(|| mesh.clone());
+        let shape = Self::assemble(name, options, key, Meshes { full_mesh, decimated, input }, way_back);
         if let Some(cache) = context.cache {
             cache.put("mesh", key, &shape.encode())?;
         }
@@ -136,12 +145,11 @@ impl Shape {
         name: &str,
         options: &ShapeOptions,
         key: CacheKey,
-        full_mesh: Mesh,
-        decimated: Option<Mesh>,
+        Meshes { full_mesh, decimated, input }: Meshes,
         way_back: WayBack,
     ) -> Self {
         let (name, whole_area) = (name.to_string(), options.whole_area);
-        Self { name, full_mesh, decimated, way_back, whole_area, key, store: Mutex::default() }
+        Self { name, full_mesh, decimated, input, way_back, whole_area, key, store: Mutex::default() }
     }
 
     /// The key of the processed mesh: the input's content, the options and their version. Quantities derive theirs from it.
@@ -164,6 +172,32 @@ impl Shape {
         self.mesh().n_vertices()
     }
 
+    /// The mesh as it was read.
+    pub fn input_mesh(&self) -> &Mesh {
+        self.input.as_ref().unwrap_or(&self.full_mesh)
+    }
+
+    /// Where the vertices of the full mesh are on the working mesh, `[n_full]`.
+    pub fn full_on_work(&self) -> Vec<Option<SurfacePoint>> {
+        let Some(full_of_work) = &self.way_back.full_of_work else { return vertices_on_surface(self.mesh()) };
+        let mut places =
+            carried_points(&vertices_on_surface(&self.full_mesh), &self.full_mesh, self.mesh(), CARRIED_WITHIN);
+        // Vertices of both are exactly there.
+        for (place, &full) in vertices_on_surface(self.mesh()).into_iter().zip(full_of_work) {
+            places[full as usize] = place;
+        }
+        places
+    }
+
+    /// Points of the working mesh as points of the input, `[points]`.
+    pub fn on_input(&self, points: &[Option<SurfacePoint>]) -> Vec<Option<SurfacePoint>> {
+        let changed = self.decimated.is_some() || self.input.is_some();
+        match changed {
+            true => carried_points(points, self.mesh(), self.input_mesh(), CARRIED_WITHIN),
+            false => points.to_vec(),
+        }
+    }
+
     /// Number of vertices of the input mesh.
     pub fn n_input(&self) -> usize {
         self.way_back.full_of_input.len()
@@ -177,6 +211,8 @@ impl Shape {
     fn encode(&self) -> Vec<u8> {
         let mut out = Encoder::default();
         encode_mesh(&mut out, &self.full_mesh);
+        out.value(u8::from(self.input.is_some()));
+        self.input.iter().for_each(|input| encode_mesh(&mut out, input));
         out.slice(&self.way_back.input_of_full).slice(&self.way_back.full_of_input);
         let decimated = self.decimated.as_ref().zip(self.way_back.full_of_work.as_ref());
         out.value(u8::from(decimated.is_some()));
@@ -190,6 +226,10 @@ impl Shape {
     fn decode(name: &str, options: &ShapeOptions, key: CacheKey, bytes: &[u8]) -> Option<Self> {
         let mut input = Decoder::new(bytes);
         let full_mesh = decode_mesh(&mut input)?;
+        let as_read = match input.value::<u8>()? {
+            0 => None,
+            _ => Some(decode_mesh(&mut input)?),
+        };
         let (input_of_full, full_of_input) = (input.slice()?, input.slice()?);
         let (mut decimated, mut full_of_work) = (None, None);
         if input.value::<u8>()? != 0 {
@@ -198,8 +238,16 @@ impl Shape {
         }
         let way_back = WayBack { input_of_full, full_of_input, full_of_work };
         let fits = way_back.fits(&full_mesh, decimated.as_ref());
-        fits.then(|| Self::assemble(name, options, key, full_mesh, decimated, way_back))
+        let meshes = Meshes { full_mesh, decimated, input: as_read };
+        fits.then(|| Self::assemble(name, options, key, meshes, way_back))
     }
+}
+
+/// The meshes of a shape, as its fields of the same names.
+struct Meshes {
+    full_mesh: Mesh,
+    decimated: Option<Mesh>,
+    input: Option<Mesh>,
 }
 
 fn mesh_key(mesh: &Mesh, options: &ShapeOptions) -> CacheKey {

@@ -9,6 +9,7 @@ pub(crate) use graph::{axis, float, integer, integers};
 
 use crate::checkpoint::Checkpoint;
 use crate::network::{Network, NetworkOptions, Normalization, parameter_values};
+use fmnet::quality::Calibration;
 use fmnet::diffusion_net::Parameter;
 use fmnet::io::{IoError, write_atomically};
 use fmnet::network::contract::{FORMAT_VERSION, ModelMetadata};
@@ -36,11 +37,13 @@ pub struct ModelOrigin {
     pub license: String,
     /// Revision of the source. Default: the version of this crate.
     pub commit: String,
+    /// What turns the measures of its maps into an estimate of their error. Default: none, and the library's own is used.
+    pub calibration: Option<Calibration>,
 }
 
 impl Default for ModelOrigin {
     fn default() -> Self {
-        Self { training_set: None, license: "unspecified".into(), commit: env!("CARGO_PKG_VERSION").into() }
+        Self { training_set: None, license: "unspecified".into(), commit: env!("CARGO_PKG_VERSION").into(), calibration: None }
     }
 }
 
@@ -67,6 +70,7 @@ pub fn metadata(checkpoint: &Checkpoint, origin: &ModelOrigin) -> ModelMetadata 
         steps: checkpoint.step,
         commit: origin.commit.clone(),
         license: origin.license.clone(),
+        calibration: origin.calibration,
     }
 }
 

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::network::Backend;
-use fmnet::pipeline::{DescriptorKind, MatchOptions, ModelSource, Refinement, Upscaling};
+use fmnet::pipeline::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -91,12 +91,15 @@ pub(crate) struct PipelineArgs {
     /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 for bidirectional, else 0.1]
     #[arg(long, value_parser = non_negative)]
     pub(crate) mask_weight: Option<f64>,
-    /// Refinement of the map [default: zoomout; none with SHOT]
+    /// Refinement of the map [default: wavelet, or zoomout for models that find one functional map; none with SHOT]
     #[arg(long, value_enum)]
     pub(crate) refine: Option<Refinement>,
     /// How the map of decimated meshes becomes one of the full meshes
-    #[arg(long, value_enum, default_value = "l21")]
+    #[arg(long, value_enum, default_value = "surface")]
     pub(crate) upscale: Upscaling,
+    /// How many ways to a map are tried; the one that looks best is taken
+    #[arg(long, value_enum, default_value = "normal")]
+    pub(crate) effort: Effort,
 }
 
 #[derive(Debug, Args)]
@@ -123,6 +126,9 @@ pub(crate) struct MatchArgs {
     /// unit of length. Parts determine fewer eigenfunctions: try -k 70 where the map is poor
     #[arg(long)]
     pub(crate) partial: bool,
+    /// End with exit status 3 where the map is doubtful or mirrored; it is written all the same
+    #[arg(long)]
+    pub(crate) strict: bool,
     /// Write the functional map, [k of target, k of source]
     #[arg(long, value_name = "FILE.npy")]
     pub(crate) save_functional_map: Option<PathBuf>,
@@ -291,6 +297,7 @@ impl PipelineArgs {
             solver: FmapSolver::chosen(self.fm, self.mask_weight),
             refinement: self.refine,
             upscaling: self.upscale,
+            effort: self.effort,
             ..self.shape.to_options()
         }
     }

@@ -130,6 +130,9 @@ pub(crate) fn shown(path: &Path) -> String {
 /// 1 where the program or the machine failed (a file that cannot be written, a solver that did not converge), 2 for bad usage
 /// or bad input.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.is::<crate::commands::Doubtful>() {
+        return ExitCode::from(3);
+    }
     let unwritable = matches!(error.downcast_ref(), Some(IoError::Write { .. }));
     let failed = unwritable || error.downcast_ref::<fmnet::Error>().is_some_and(fmnet::Error::is_own_failure);
     ExitCode::from(if failed { 1 } else { 2 })

@@ -25,7 +25,7 @@ use crate::Matrix;
 use bisect::Partition;
 use kernels::Kernels;
 use leaves::Leaves;
-pub(crate) use mutual::mutual_nearest;
+pub(crate) use mutual::{mutual_nearest_by, squared_norms};
 use thiserror::Error;
 
 /// For each query, the nearest target.

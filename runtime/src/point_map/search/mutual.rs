@@ -15,12 +15,18 @@ const COLUMNS: usize = 256;
 /// Accumulators along a row of the product, which the compiler keeps in vector registers.
 const LANES: usize = 16;
 
-/// For each row of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round; of equally near
-/// ones the lowest. The same for any number of threads.
+/// For each row `a_x` of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round; of equally
+/// near ones the lowest. The same for any number of threads.
+///
+/// The squared distance is `s_x + t_y - 2 a_x . b_y`, where `s`, `[n_a]`, and `t`, `[n_b]`, are the squared norms of the rows or what
+/// takes their place.
 ///
 /// # Errors
 /// If a set is empty, an entry is not finite, or the widths differ.
-pub(crate) fn mutual_nearest(a: &Matrix, b: &Matrix) -> Result<[Vec<u32>; 2], SearchError> {
+pub(crate) fn mutual_nearest_by(
+    [a, b]: [&Matrix; 2],
+    [a_squares, b_squares]: [&[f64]; 2],
+) -> Result<[Vec<u32>; 2], SearchError> {
     if a.cols() != b.cols() {
         return Err(SearchError::WidthMismatch { queries: a.cols(), targets: b.cols() });
     }
@@ -29,7 +35,7 @@ pub(crate) fn mutual_nearest(a: &Matrix, b: &Matrix) -> Result<[Vec<u32>; 2], Se
     }
     check_finite(a, "queries")?;
     check_finite(b, "targets")?;
-    let (a, b) = (Rows::new(a), Rows::new(b));
+    let (a, b) = (Rows::new(a, a_squares), Rows::new(b, b_squares));
     let blocks: Vec<Block> =
         (0..a.n().div_ceil(ROWS)).into_par_iter().map(|block| Block::new(&a, &b, block * ROWS)).collect();
     let forth = blocks.iter().flat_map(|block| block.forth.iter().map(|best| best.index)).collect();
@@ -40,16 +46,20 @@ pub(crate) fn mutual_nearest(a: &Matrix, b: &Matrix) -> Result<[Vec<u32>; 2], Se
     Ok([forth, back.iter().map(|best| best.index).collect()])
 }
 
-/// Rows in single precision with half of their squared norms.
+/// The squared norm of each row, `[n]`.
+pub(crate) fn squared_norms(rows: &Matrix) -> Vec<f64> {
+    (0..rows.rows()).map(|i| rows.row(i).iter().map(|x| x * x).sum()).collect()
+}
+
+/// Rows in single precision with half of their squared norms, or of what takes their place.
 struct Rows {
     entries: Matrix<f32>,
     half_squares: Vec<f32>,
 }
 
 impl Rows {
-    fn new(rows: &Matrix) -> Self {
-        let half_square = |i: usize| (rows.row(i).iter().map(|x| x * x).sum::<f64>() / 2.0) as f32;
-        let half_squares = (0..rows.rows()).map(half_square).collect();
+    fn new(rows: &Matrix, squares: &[f64]) -> Self {
+        let half_squares = squares.iter().map(|square| (square / 2.0) as f32).collect();
         Self { entries: rows.map(|x| x as f32), half_squares }
     }
 
@@ -150,6 +160,10 @@ mod tests {
     use crate::point_map::search::nearest_rows;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    fn mutual_nearest(a: &Matrix, b: &Matrix) -> Result<[Vec<u32>; 2], SearchError> {
+        mutual_nearest_by([a, b], [&squared_norms(a), &squared_norms(b)])
+    }
 
     fn random(rows: usize, cols: usize, seed: u64) -> Matrix {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

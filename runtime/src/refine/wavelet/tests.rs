@@ -25,7 +25,7 @@ fn blurred(source: &Eigenbasis, target: &Eigenbasis, exact: &[PointMap; 2], k: u
     let maps = BothMaps::of([&exact[0], &exact[1]], &source, &target).unwrap();
     let disturbed = |c: &Matrix| Matrix::from_fn(k, k, |i, j| c[(i, j)] + noise(i, j));
     let maps = BothMaps { forth: disturbed(&maps.forth), back: disturbed(&maps.back) };
-    let embedding = maps.embedding(&source, &target).unwrap();
+    let embedding = maps.embedding(Comparison::Joint, &source, &target).unwrap();
     [embedding.forth().unwrap(), embedding.back().unwrap()]
 }
 
@@ -100,7 +100,7 @@ fn exchanging_the_shapes_exchanges_the_maps() {
     let k = 12;
     let maps = BothMaps::with_adjoint(identity(k));
     let (phi, psi) = (source.truncated(k), target.truncated(k));
-    let embedding = maps.embedding(&phi, &psi).unwrap();
+    let embedding = maps.embedding(Comparison::Joint, &phi, &psi).unwrap();
     let start = [embedding.forth().unwrap(), embedding.back().unwrap()];
     let found = refined(&start, [&source, &target], &options());
     let [forth, back] = start;
@@ -113,11 +113,13 @@ fn exchanging_the_shapes_exchanges_the_maps() {
 #[test]
 fn stages_begin_at_the_map_s_k_and_end_where_asked() {
     let ks = |options: &WaveletOptions| options.stages.iter().map(|stage| stage.k).collect::<Vec<_>>();
-    assert_eq!(WaveletOptions::between(100, 200), WaveletOptions::default());
-    assert_eq!(ks(&WaveletOptions::between(30, 200)), [30, 60, 128, 200]);
-    assert_eq!(ks(&WaveletOptions::between(100, 250)), [60, 128, 200, 250]);
-    assert_eq!(ks(&WaveletOptions::between(100, 100)), [60, 100]);
-    assert_eq!(ks(&WaveletOptions::between(40, 40)), [40]);
+    let rough = WaveletOptions::coarse_to_fine;
+    assert_eq!(ks(&rough(100, 200)), [60, 128, 200]);
+    assert_eq!(ks(&rough(30, 200)), [30, 60, 128, 200]);
+    assert_eq!(ks(&rough(100, 250)), [60, 128, 200, 250]);
+    assert_eq!(ks(&rough(100, 100)), [60, 100]);
+    assert_eq!(ks(&rough(40, 40)), [40]);
+    assert_eq!(WaveletOptions::default(), WaveletOptions::at(200));
 }
 
 #[test]
@@ -140,7 +142,7 @@ fn options_out_of_range_and_parts_are_errors() {
         assert!(matches!(wavelet(maps, &basis, &basis, &default), Err(RefineError::Fmap(_))));
     }
     let clamped = refined(&[map.clone(), map.clone()], [&basis, &basis], &default);
-    assert_eq!(clamped.info.rounds, [10; 10]);
+    assert_eq!(clamped.info.rounds, [10; 3]);
 }
 
 #[test]

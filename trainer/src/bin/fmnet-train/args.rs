@@ -207,6 +207,10 @@ pub(crate) struct ExportArgs {
     /// Meshes of more vertices are decimated to so many when they are matched, 100 or more; 0: never [default: as in training]
     #[arg(long, value_name = "N")]
     pub(crate) decimate: Option<usize>,
+    /// What turns the measures of a map into an estimate of its error, as `fmnet-train calibrate` writes it [default: the
+    /// program's own]
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) calibration: Option<PathBuf>,
     /// Source revision, for the metadata
     #[arg(long, default_value = env!("CARGO_PKG_VERSION"))]
     pub(crate) commit: String,

@@ -6,6 +6,7 @@ use crate::console::{Console, shown};
 use anyhow::{Result, bail};
 use fmnet::io::{MeshFile, read_mesh, write_matrix};
 use fmnet::pipeline::{Match, Matcher};
+use fmnet::quality::{Estimate, Quality};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -47,7 +48,18 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
         json!({ "file": shown(&args.target), "vertices": target.n_vertices(), "faces": target.n_faces() });
     summary["outputs"] = args.outputs.iter().map(|path| shown(path)).collect();
     summary["seconds"] = json!(start.elapsed().as_secs_f64());
-    Ok(console.result(&text, summary)?)
+    console.result(&text, summary)?;
+    match args.strict && (result.estimate.doubtful || result.quality.is_mirrored()) {
+        true => Err(Doubtful { expected_error: result.estimate.expected_error }.into()),
+        false => Ok(()),
+    }
+}
+
+/// A map that `--strict` does not let pass.
+#[derive(Debug, thiserror::Error)]
+#[error("the map is doubtful, expected mean error {expected_error:.1} % of sqrt(area) (--strict); it was written")]
+pub(crate) struct Doubtful {
+    expected_error: f64,
 }
 
 /// All outputs; refuses those that could not be written.
@@ -78,7 +90,12 @@ fn summary_text(result: &Match, seconds: f64) -> String {
         Some(_) => "; both meshes are triangulated alike, and the map follows the triangulation",
         None => "",
     };
-    format!("{matched} of {} source vertices matched in {seconds:.2} s{origin}", result.map.len())
+    let trust = if result.estimate.doubtful || result.quality.is_mirrored() { ", DOUBTFUL" } else { "" };
+    format!(
+        "{matched} of {} source vertices matched in {seconds:.2} s{origin}; expected mean error {:.1} % of sqrt(area){trust}",
+        result.map.len(),
+        result.estimate.expected_error
+    )
 }
 
 /// Settings and outcome of a match, for scripts.
@@ -102,5 +119,22 @@ pub(super) fn summary(matcher: &Matcher, result: &Match) -> Value {
         "functional_map": { "rank": info.rank, "condition": info.condition },
         "pmf": filter,
         "upscale": upscale,
+        "quality": quality(&result.quality, &result.estimate),
+        "candidates": result.candidates.iter().map(|candidate| {
+            let mut value = quality(&candidate.quality, &candidate.estimate);
+            value["name"] = json!(candidate.name);
+            value["taken"] = json!(candidate.taken);
+            value
+        }).collect::<Vec<_>>(),
     })
+}
+
+/// Measures of a map and what they say of its error, which is in units of sqrt(area), times 100.
+pub(super) fn quality(quality: &Quality, estimate: &Estimate) -> Value {
+    let mut value = json!(quality);
+    value["expected_error"] = json!(estimate.expected_error);
+    value["probability_bad"] = json!(estimate.bad);
+    value["doubtful"] = json!(estimate.doubtful || quality.is_mirrored());
+    value["mirrored"] = json!(quality.is_mirrored());
+    value
 }

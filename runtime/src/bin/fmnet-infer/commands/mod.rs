@@ -11,3 +11,5 @@ mod output;
 mod pairs;
 pub(crate) mod transfer;
 mod values;
+
+pub(crate) use matching::Doubtful;

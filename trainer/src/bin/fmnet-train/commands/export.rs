@@ -1,12 +1,14 @@
 //! `fmnet-train export`.
 
 use crate::args::{Common, ExportArgs};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use candle_core::Device;
+use fmnet::quality::Calibration;
 use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::export::{ModelOrigin, export, metadata};
 use fmnet_trainer::train::best_checkpoint;
 use serde_json::json;
+use std::path::Path;
 
 pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
     let path =
@@ -16,6 +18,7 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
         training_set: args.training_set.clone(),
         license: args.license.clone(),
         commit: args.commit.clone(),
+        calibration: args.calibration.as_deref().map(read_calibration).transpose()?,
     };
     let mut metadata = metadata(&checkpoint, &origin);
     match args.decimate {
@@ -31,4 +34,11 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
         println!("{:#}", json!({ "checkpoint": path, "model": args.output, "metadata": metadata }));
     }
     Ok(())
+}
+
+fn read_calibration(path: &Path) -> Result<Calibration> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    Calibration::from_json(&text).map_err(|reason| {
+        anyhow!("{}: the calibration {reason}; make it anew by fmnet-train calibrate", path.display())
+    })
 }

@@ -1,7 +1,7 @@
-//! Point maps of both directions from one embedding of both shapes.
+//! Both shapes in one space, in which the nearest rows give the point maps.
 
-use super::recover::{check_shape, cosines, transport};
-use super::search::{NearestRows, SearchError, mutual_nearest, nearest_rows};
+use super::recover::{Comparison, check_shape, cosines, transport};
+use super::search::{NearestRows, SearchError, mutual_nearest_by, nearest_rows, squared_norms};
 use super::{PointMap, RecoverError};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
@@ -9,25 +9,28 @@ use crate::spectral::Eigenbasis;
 /// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
 const MOST_PRODUCTS: usize = 1 << 28;
 
-/// Both shapes in the space of the coefficients of both, `[k_target, k_source]` wide: the row of a source vertex `x` is
-/// `[C12 phi(x), phi(x)]`, that of a target vertex `y` is `[psi(y), C21 psi(y)]`.
+/// Both shapes in the space in which a functional map compares their vertices, a row for each.
 ///
-/// A distance in it is what the two functional maps miss together, `|C12 phi(x) - psi(y)|^2 + |phi(x) - C21 psi(y)|^2`; it is
-/// the same from either side, so that one embedding gives the point maps of both directions.
+/// By [`Comparison::Joint`] it is the space of the coefficients of both, `k_target + k_source` wide: the row of a source vertex
+/// `x` is `[C12 phi(x), phi(x)]`, that of a target vertex `y` is `[psi(y), C21 psi(y)]`. A distance in it is what the two
+/// functional maps miss together, `|C12 phi(x) - psi(y)|^2 + |phi(x) - C21 psi(y)|^2`; it is the same from either side, so that
+/// one embedding gives the point maps of both directions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct JointEmbedding {
-    /// `[Phi C12^T, Phi]`, `[n_source, k_target + k_source]`.
+pub struct Embedding {
+    /// The rows of the source, `[n_source, d]`; joint: `[Phi C12^T, Phi]`.
     pub source: Matrix,
-    /// `[Psi, Psi C21^T]`, `[n_target, k_target + k_source]`.
+    /// The rows of the target, `[n_target, d]`; joint: `[Psi, Psi C21^T]`.
     pub target: Matrix,
+    /// Joint: `Phi (C12^T + C21)`, `[n_source, k_target]`, and `Psi`, whose products are those of the rows in half the width.
+    factors: Option<[Matrix; 2]>,
 }
 
-impl JointEmbedding {
-    /// The embedding of the functional maps `forth`, `[k_target, k_source]`, and `back`, `[k_source, k_target]`.
+impl Embedding {
+    /// The joint embedding of the functional maps `forth`, `[k_target, k_source]`, and `back`, `[k_source, k_target]`.
     ///
     /// # Errors
     /// If a map is not of that shape.
-    pub fn new(
+    pub fn joint(
         forth: &Matrix,
         back: &Matrix,
         basis_source: &Eigenbasis,
@@ -36,7 +39,41 @@ impl JointEmbedding {
         check_shape(forth, basis_source, basis_target)?;
         check_shape(back, basis_target, basis_source)?;
         let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
-        Ok(Self { source: beside(&transport(phi, forth), phi), target: beside(psi, &transport(psi, back)) })
+        let (to_target, to_source) = rayon::join(|| transport(phi, forth), || transport(psi, back));
+        let sum = Matrix::from_fn(forth.rows(), forth.cols(), |i, j| forth[(i, j)] + back[(j, i)]);
+        let factors = Some([transport(phi, &sum), psi.clone()]);
+        Ok(Self { source: beside(&to_target, phi), target: beside(psi, &to_source), factors })
+    }
+
+    /// The embedding of one functional map `c`, `[k_target, k_source]`, for a comparison; joint with its adjoint.
+    ///
+    /// # Errors
+    /// If the map is not of that shape.
+    pub fn of_one(
+        comparison: Comparison,
+        c: &Matrix,
+        basis_source: &Eigenbasis,
+        basis_target: &Eigenbasis,
+    ) -> Result<Self, RecoverError> {
+        check_shape(c, basis_source, basis_target)?;
+        let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
+        let (source, target) = match comparison {
+            Comparison::Joint => return Self::joint(c, &c.transposed(), basis_source, basis_target),
+            Comparison::Distance => (transport(phi, c), psi.clone()),
+            Comparison::Adjoint => (phi.clone(), transport(psi, &c.transposed())),
+        };
+        Ok(Self { source, target, factors: None })
+    }
+
+    /// Rows of any kind, `[n_source, d]` and `[n_target, d]`, such as descriptors.
+    ///
+    /// # Errors
+    /// If their widths differ.
+    pub fn of_rows(source: Matrix, target: Matrix) -> Result<Self, SearchError> {
+        if source.cols() != target.cols() {
+            return Err(SearchError::WidthMismatch { queries: source.cols(), targets: target.cols() });
+        }
+        Ok(Self { source, target, factors: None })
     }
 
     /// For each source vertex the nearest target vertex, the lowest of several; the confidence is the cosine of the angle
@@ -48,7 +85,7 @@ impl JointEmbedding {
         nearest(&self.source, &self.target)
     }
 
-    /// For each target vertex the nearest source vertex, as [`JointEmbedding::forth`].
+    /// For each target vertex the nearest source vertex, as [`Embedding::forth`].
     ///
     /// # Errors
     /// If an entry is not finite, or there are no source vertices.
@@ -56,11 +93,30 @@ impl JointEmbedding {
         nearest(&self.target, &self.source)
     }
 
-    /// The matches of both directions, source to target first, for maps that are not final: between small shapes in single
-    /// precision.
-    pub(crate) fn both(&self) -> Result<[Vec<u32>; 2], SearchError> {
+    /// The point maps of both directions, source to target first, as [`Embedding::forth`] and [`Embedding::back`] but
+    /// between small shapes in single precision, which takes a fraction of the time: distances that agree to six digits may be
+    /// taken for one another.
+    ///
+    /// # Errors
+    /// If an entry is not finite, or a shape has no vertices.
+    pub fn both(&self) -> Result<[PointMap; 2], RecoverError> {
+        let [forth, back] = self.matches()?;
+        let map = |queries: &Matrix, rows: &Matrix, targets: Vec<u32>| {
+            let confidence = Some(cosines(queries, rows, &targets));
+            PointMap { targets, confidence, points: None, n_target: rows.rows() }
+        };
+        Ok([map(&self.source, &self.target, forth), map(&self.target, &self.source, back)])
+    }
+
+    /// The matches of [`Embedding::both`].
+    pub(crate) fn matches(&self) -> Result<[Vec<u32>; 2], SearchError> {
         if self.source.rows().saturating_mul(self.target.rows()) <= MOST_PRODUCTS {
-            return mutual_nearest(&self.source, &self.target);
+            let squares = [squared_norms(&self.source), squared_norms(&self.target)];
+            let [left, right] = match &self.factors {
+                Some([left, right]) => [left, right],
+                None => [&self.source, &self.target],
+            };
+            return mutual_nearest_by([left, right], [&squares[0], &squares[1]]);
         }
         let (forth, back) = rayon::join(
             || nearest_rows(&self.source, &self.target),
@@ -73,7 +129,7 @@ impl JointEmbedding {
 fn nearest(queries: &Matrix, rows: &Matrix) -> Result<PointMap, RecoverError> {
     let targets = NearestRows::new(rows)?.nearest(queries)?.index;
     let confidence = Some(cosines(queries, rows, &targets));
-    Ok(PointMap { targets, confidence, n_target: rows.rows() })
+    Ok(PointMap { targets, confidence, points: None, n_target: rows.rows() })
 }
 
 /// `[left, right]`, two matrices of as many rows beside each other.
@@ -93,10 +149,12 @@ mod tests {
         let source = rectangle(30, 40, 25);
         let order = shuffle(1200);
         let target = reordered(&source, &order);
-        let embedding = BothMaps::with_adjoint(identity(25)).embedding(&source, &target).unwrap();
+        let embedding = BothMaps::with_adjoint(identity(25)).embedding(Comparison::Joint, &source, &target).unwrap();
         let (forth, back) = (embedding.forth().unwrap(), embedding.back().unwrap());
         assert_eq!(back.targets, order);
-        assert_eq!(embedding.both().unwrap(), [forth.targets.clone(), order.clone()]);
+        assert_eq!(embedding.matches().unwrap(), [forth.targets.clone(), order.clone()]);
+        let both = embedding.both().unwrap();
+        assert_eq!(both, [forth.clone(), back.clone()]);
         assert!(order.iter().enumerate().all(|(y, &x)| forth.targets[x as usize] == y as u32));
         assert!(forth.confidence.iter().chain(&back.confidence).flatten().all(|&c| c > 1.0 - 1e-6));
     }
@@ -106,7 +164,7 @@ mod tests {
         let (source, target) = (rectangle(11, 12, 9), rectangle(13, 10, 7));
         let wave = |rows, cols| Matrix::from_fn(rows, cols, |i, j| ((i * cols + j) as f64 * 1.7).sin());
         let maps = BothMaps { forth: wave(7, 9), back: wave(9, 7) };
-        let embedding = maps.embedding(&source, &target).unwrap();
+        let embedding = maps.embedding(Comparison::Joint, &source, &target).unwrap();
         let image = |c: &Matrix, row: &[f64]| -> Vec<f64> {
             (0..c.rows()).map(|i| c.row(i).iter().zip(row).map(|(a, b)| a * b).sum()).collect()
         };
@@ -123,7 +181,7 @@ mod tests {
             let least = (0..source.n()).map(|x| distance(x, y)).fold(f64::INFINITY, f64::min);
             assert!(distance(*x as usize, y) <= least + 1e-12);
         }
-        let exchanged = maps.reversed().embedding(&target, &source).unwrap();
+        let exchanged = maps.reversed().embedding(Comparison::Joint, &target, &source).unwrap();
         assert_eq!(exchanged.forth().unwrap().targets, embedding.back().unwrap().targets);
     }
 
@@ -139,8 +197,8 @@ mod tests {
             forth: Matrix::from_fn(20, 25, |i, j| sign(i) * maps.forth[(i, j)]),
             back: Matrix::from_fn(25, 20, |i, j| sign(j) * maps.back[(i, j)]),
         };
-        let expected = maps.embedding(&source, &target).unwrap();
-        let found = other.embedding(&source, &flipped(&target)).unwrap();
+        let expected = maps.embedding(Comparison::Joint, &source, &target).unwrap();
+        let found = other.embedding(Comparison::Joint, &source, &flipped(&target)).unwrap();
         assert_eq!(found.forth().unwrap().targets, expected.forth().unwrap().targets);
         assert_eq!(found.back().unwrap().targets, expected.back().unwrap().targets);
     }
@@ -149,7 +207,7 @@ mod tests {
     fn a_map_of_the_wrong_shape_is_an_error() {
         let (source, target) = (rectangle(9, 8, 10), rectangle(9, 8, 12));
         let maps = BothMaps { forth: Matrix::zeros(12, 10), back: Matrix::zeros(12, 10) };
-        let error = maps.embedding(&source, &target).unwrap_err();
+        let error = maps.embedding(Comparison::Joint, &source, &target).unwrap_err();
         let expected = RecoverError::ShapeMismatch { rows: 12, cols: 10, k_target: 10, k_source: 12 };
         assert_eq!(error, expected);
     }

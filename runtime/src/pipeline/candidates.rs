@@ -1,0 +1,129 @@
+//! Other ways to the map of a pair, tried where the first looks wrong; the best by its quality is taken.
+
+use super::pair::{Found, Judge, Pair};
+use super::{Effort, Refinement};
+use crate::Matrix;
+use crate::error::Error;
+use crate::fmap::{FmapSolver, SolverKind, functional_maps};
+use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
+use crate::quality::{Estimate, Quality};
+use crate::refine::WaveletOptions;
+use serde::{Deserialize, Serialize};
+
+/// A map before refinement, both ways.
+pub(super) struct Start {
+    pub(super) functional_map: Matrix,
+    pub(super) map: PointMap,
+    pub(super) back: PointMap,
+    pub(super) embedding: Embedding,
+}
+
+/// One way that was tried, and what came of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// How it was made.
+    pub name: String,
+    /// Measures of the map.
+    pub quality: Quality,
+    /// What they say of its error.
+    pub estimate: Estimate,
+    /// Whether it was taken.
+    pub taken: bool,
+}
+
+/// The map taken, and all that were tried.
+pub(super) struct Tried {
+    pub(super) found: Found,
+    pub(super) quality: Quality,
+    pub(super) estimate: Estimate,
+    pub(super) candidates: Vec<Candidate>,
+}
+
+impl Tried {
+    fn first(name: &str, found: Found, (quality, estimate): (Quality, Estimate)) -> Self {
+        let candidate = Candidate { name: name.to_string(), quality, estimate, taken: true };
+        Self { found, quality, estimate, candidates: vec![candidate] }
+    }
+
+    /// Takes another map if it is better.
+    fn add(&mut self, name: &str, found: Found, (quality, estimate): (Quality, Estimate)) {
+        let better = estimate.expected_error < self.estimate.expected_error;
+        if better {
+            self.candidates.iter_mut().for_each(|candidate| candidate.taken = false);
+            (self.found, self.quality, self.estimate) = (found, quality, estimate);
+        }
+        self.candidates.push(Candidate { name: name.to_string(), quality, estimate, taken: better });
+    }
+}
+
+impl Pair<'_> {
+    /// The first map, or a better one where it is doubtful or effort is asked for.
+    pub(super) fn with_candidates(
+        &self,
+        judge: &Judge,
+        start: &Start,
+        found: Found,
+    ) -> Result<Tried, Error> {
+        let judged = judge.judge(&found)?;
+        let mut tried = Tried::first("default", found, judged);
+        let wanted = match self.matcher.effort {
+            Effort::Low => false,
+            Effort::Normal => tried.estimate.doubtful,
+            Effort::High => true,
+        };
+        // Other refinements were asked for by name, and a part has no map back.
+        if !wanted || self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
+            return Ok(tried);
+        }
+        let (matcher, k) = (self.matcher, self.refined_k());
+        let rough = WaveletOptions::coarse_to_fine(matcher.k, k);
+        let mut attempt = |name: &str, found: Result<Found, Error>| -> Result<(), Error> {
+            let found = found?;
+            let judged = judge.judge(&found)?;
+            tried.add(name, found, judged);
+            Ok(())
+        };
+        attempt("coarse to fine", self.wavelet(start, &rough))?;
+        let features = self.by_features()?;
+        attempt("features alone", self.refine(Refinement::Wavelet, &features))?;
+        attempt("features alone, coarse to fine", self.wavelet(&features, &rough))?;
+        for (name, k, weight) in [("k = 50", 50, 0.1), ("strong mask", matcher.k, 1.0)] {
+            let start = self.solved_again(k.min(matcher.k), weight)?;
+            attempt(name, self.wavelet(&start, &rough))?;
+        }
+        Ok(tried)
+    }
+
+    /// Nearest neighbours among the descriptors, without a functional map.
+    fn by_features(&self) -> Result<Start, Error> {
+        let [source, target] = [self.source, self.target].map(|described| normalised(&described.descriptors));
+        let embedding = Embedding::of_rows(source, target).map_err(RecoverError::from)?;
+        let [map, back] = embedding.both()?;
+        let [phi, psi] = self.bases(self.matcher.k)?;
+        let functional_map = crate::fmap::functional_map_of(&map, &phi, &psi)?;
+        Ok(Start { functional_map, map, back, embedding })
+    }
+
+    /// The functional maps at another `k` or weight of the mask.
+    fn solved_again(&self, k: usize, weight: f64) -> Result<Start, Error> {
+        let bases = self.bases(k)?;
+        let f = bases[0].project(&self.source.descriptors);
+        let g = bases[1].project(&self.target.descriptors);
+        let solver = FmapSolver::new(SolverKind::Joint, Some(weight));
+        let (maps, _) = functional_maps(&bases[0], &bases[1], &f, &g, solver)?;
+        self.start(&maps, Comparison::Joint, &bases)
+    }
+}
+
+/// Rows of length 1, in double precision.
+fn normalised(rows: &Matrix<f32>) -> Matrix {
+    let mut rows = rows.map(f64::from);
+    for i in 0..rows.rows() {
+        let row = rows.row_mut(i);
+        let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length > 0.0 {
+            row.iter_mut().for_each(|x| *x /= length);
+        }
+    }
+    rows
+}

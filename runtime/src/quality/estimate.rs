@@ -1,0 +1,84 @@
+//! From measures to an estimate of the error.
+
+use super::Quality;
+use serde::{Deserialize, Serialize};
+
+/// How measures of a map become an estimate of its error; fitted on maps with known errors, in the model's metadata.
+///
+/// Both are linear in `log(measure + a small number)` of each measure: the logarithm of the expected mean error, and the log-odds that it is above 0.1 sqrt(area).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// Constant and weights of the logarithm of the expected error.
+    pub error: [f64; Calibration::WIDTH],
+    /// Constant and weights of the log-odds that the map is bad.
+    pub bad: [f64; Calibration::WIDTH],
+    /// The probability from which a map is called doubtful.
+    pub doubtful: f64,
+}
+
+/// What the measures say of a map's error.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The mean error to expect, in units of sqrt(area), times 100.
+    pub expected_error: f64,
+    /// The probability that the mean error is above 10.
+    pub bad: f64,
+    /// Whether that is so probable that the map should not be used without a look.
+    pub doubtful: bool,
+}
+
+impl Default for Calibration {
+    /// Fitted on maps of several models between bodies of many makers.
+    fn default() -> Self {
+        Self {
+            error: [1.9, 0.35, 0.15, 0.05, 0.1, 0.05],
+            bad: [-3.0, 1.0, 1.0, 0.2, 0.5, 0.3],
+            doubtful: 0.5,
+        }
+    }
+}
+
+impl Calibration {
+    /// A constant and a weight for each measure.
+    pub const WIDTH: usize = 6;
+
+    /// The features that the weights are for: 1 and the logarithms of commutativity, Dirichlet energy, orthogonality, stretched and reversed share.
+    pub fn features(quality: &Quality) -> [f64; Self::WIDTH] {
+        let log = |value: f64, floor: f64| (value.max(0.0) + floor).ln();
+        [
+            1.0,
+            log(quality.commutativity, 1e-3),
+            log(quality.dirichlet, 1e-2),
+            log(quality.orthogonality, 1e-3),
+            log(quality.stretched, 1e-3),
+            log(quality.reversed, 1e-2),
+        ]
+    }
+
+    /// As in a model's metadata.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("plain numbers serialise")
+    }
+
+    /// Reads what [`Calibration::to_json`] writes.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub fn from_json(text: &str) -> Result<Self, String> {
+        let calibration: Self = serde_json::from_str(text).map_err(|e| format!("does not parse ({e})"))?;
+        let mut weights = calibration.error.iter().chain(&calibration.bad);
+        match weights.all(|w| w.is_finite()) && (0.0..=1.0).contains(&calibration.doubtful) {
+            true => Ok(calibration),
+            false => Err("has a weight that is not finite, or a threshold that is no probability".to_string()),
+        }
+    }
+
+    /// The estimate for a map of these measures.
+    pub fn estimate(&self, quality: &Quality) -> Estimate {
+        let features = Self::features(quality);
+        let linear = |weights: &[f64]| weights.iter().zip(features).map(|(w, x)| w * x).sum::<f64>();
+        let bad = 1.0 / (1.0 + (-linear(&self.bad)).exp());
+        Estimate { expected_error: linear(&self.error).exp().min(100.0), bad, doubtful: bad >= self.doubtful }
+    }
+}

@@ -1,0 +1,99 @@
+use super::*;
+use crate::mesh::shapes::{bumpy_sphere, permuted, rotation, transformed};
+use crate::spectral::{EigenOptions, eigenbasis};
+
+/// What the measures need of a mesh.
+struct Measured {
+    mesh: Mesh,
+    laplacian: Laplacian,
+    basis: Eigenbasis,
+    frame: SurfaceFrame,
+}
+
+impl Measured {
+    fn new(mesh: Mesh) -> Self {
+        let laplacian = Laplacian::new(&mesh);
+        let basis = eigenbasis(&laplacian, 30, &EigenOptions::default()).unwrap().0.at_unit_area(30);
+        let frame = SurfaceFrame::new(&mesh);
+        Self { mesh, laplacian, basis, frame }
+    }
+
+    fn side(&self) -> Side<'_> {
+        Side { mesh: &self.mesh, laplacian: &self.laplacian, basis: &self.basis, frame: &self.frame }
+    }
+}
+
+const STRAIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+fn identity(n: usize) -> PointMap {
+    PointMap::new((0..n as u32).collect(), n)
+}
+
+#[test]
+fn a_right_map_has_nothing_wrong() {
+    let source = Measured::new(bumpy_sphere(3, 1));
+    let turned = transformed(&source.mesh, rotation([1.0, 2.0, 3.0], 0.7), 20.0, [3.0, 4.0, 5.0]);
+    let (target, new_of_old) = permuted(&turned, 5);
+    let target = Measured::new(target);
+    let n = source.mesh.n_vertices();
+    let mut back = vec![0; n];
+    new_of_old.iter().enumerate().for_each(|(old, &new)| back[new as usize] = old as u32);
+    let (map, back) = (PointMap::new(new_of_old, n), PointMap::new(back, n));
+    let quality = Quality::measure(&map, Some(&back), source.side(), target.side()).unwrap();
+    assert!(quality.commutativity < 1e-9 && quality.orthogonality < 1e-9, "{quality:?}");
+    assert!((quality.dirichlet - 2.0).abs() < 1e-9, "{quality:?}");
+    assert_eq!((quality.stretched, quality.reversed, quality.cycle), (0.0, 0.0, Some(0.0)));
+    assert!((quality.coverage - 1.0).abs() < 1e-12);
+    let doubt = doubt(&map, Some(&back), source.side(), target.side());
+    assert!(doubt.iter().all(|&doubt| doubt == 0.0));
+}
+
+#[test]
+fn a_mirrored_map_is_reversed_everywhere() {
+    let source = Measured::new(bumpy_sphere(3, 1));
+    let vertices = source.mesh.vertices().iter().map(|&[x, y, z]| [-x, y, z]).collect();
+    // Outward normals, as repair leaves them.
+    let faces = source.mesh.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let target = Measured::new(Mesh::new(vertices, faces).unwrap());
+    let map = identity(source.mesh.n_vertices());
+    let quality = Quality::measure(&map, None, source.side(), target.side()).unwrap();
+    assert!(quality.is_mirrored() && quality.reversed > 0.999, "{quality:?}");
+    assert!(quality.commutativity < 1e-9, "no other measure sees it: {quality:?}");
+    let doubt = doubt(&map, None, source.side(), target.side());
+    assert!(doubt.iter().all(|&doubt| doubt > 0.9));
+}
+
+#[test]
+fn doubt_is_where_the_map_is_wrong() {
+    let source = Measured::new(transformed(&bumpy_sphere(4, 2), STRAIGHT, 3.0, [0.0; 3]));
+    let n = source.mesh.n_vertices();
+    let mut map = identity(n);
+    // A cap goes to random places.
+    let wrong: Vec<usize> = (0..n).filter(|&v| source.mesh.vertices()[v][2] > 2.0).collect();
+    wrong.iter().for_each(|&v| map.targets[v] = ((v * 7919) % n) as u32);
+    let quality = Quality::measure(&map, None, source.side(), source.side()).unwrap();
+    let right = Quality::measure(&identity(n), None, source.side(), source.side()).unwrap();
+    assert!(quality.commutativity > right.commutativity + 0.01 && quality.dirichlet > 3.0 * right.dirichlet);
+    assert!(quality.stretched > 0.01 && quality.coverage < 1.0);
+    let doubt = doubt(&map, None, source.side(), source.side());
+    let mean = |vertices: &mut dyn Iterator<Item = usize>| {
+        let values: Vec<f32> = vertices.map(|v| doubt[v]).collect();
+        values.iter().sum::<f32>() / values.len() as f32
+    };
+    assert!(mean(&mut wrong.iter().copied()) > 0.6);
+    assert!(mean(&mut (0..n).filter(|&v| source.mesh.vertices()[v][2] < 1.0)) < 0.02);
+    map.targets[0] = PointMap::UNMATCHED;
+    assert_eq!(super::doubt(&map, None, source.side(), source.side())[0], 1.0);
+    let calibration = Calibration::default();
+    let [good, bad] = [right, quality].map(|quality| calibration.estimate(&quality));
+    assert!(good.expected_error < bad.expected_error && good.bad < bad.bad);
+}
+
+#[test]
+fn a_calibration_is_read_as_it_is_written() {
+    let calibration = Calibration { doubtful: 0.25, ..Calibration::default() };
+    assert_eq!(Calibration::from_json(&calibration.to_json()), Ok(calibration));
+    assert!(Calibration::from_json("{}").unwrap_err().contains("does not parse"));
+    let wrong = Calibration { doubtful: 2.0, ..calibration };
+    assert!(Calibration::from_json(&wrong.to_json()).unwrap_err().contains("probability"));
+}
