@@ -185,7 +185,8 @@ pub fn prepare(
     let sizes = [options.k as u64, options.gradients as u64, ARRAYS_VERSION];
     let shot = serde_json::to_vec(&options.shot).unwrap_or_default();
     let arrays_key = CacheKey::of(&[mesh_key.as_bytes(), bytemuck::cast_slice(&sizes), &shot]);
-    if cache.fetch(ARRAYS, arrays_key, observer).and_then(|bytes| ShapeArrays::decode(&bytes)).is_none() {
+    // Not read here: the arrays of all shapes together are large.
+    if !cache.path(ARRAYS, arrays_key).is_file() {
         // The arrays hold all that is needed of the quantities: those are not kept a second time.
         let arrays = ShapeArrays::of(&processed.shape, options, Context { cache: None, observer })?;
         cache.put(ARRAYS, arrays_key, &arrays.encode()).map_err(Error::from)?;
@@ -211,9 +212,13 @@ impl PreparedShape {
     /// If they are not there any more.
     pub fn arrays(&self) -> Result<ShapeArrays, PrepareError> {
         let bytes = self.cache.fetch(ARRAYS, self.key, &fmnet::events::ignore);
-        bytes.and_then(|bytes| ShapeArrays::decode(&bytes)).ok_or_else(|| PrepareError::Gone {
-            shape: self.entry.name.clone(),
-            path: self.cache.path(ARRAYS, self.key).display().to_string(),
+        bytes.and_then(|bytes| ShapeArrays::decode(&bytes)).ok_or_else(|| {
+            // If it is damaged, the next run makes it anew.
+            let _ = std::fs::remove_file(self.cache.path(ARRAYS, self.key));
+            PrepareError::Gone {
+                shape: self.entry.name.clone(),
+                path: self.cache.path(ARRAYS, self.key).display().to_string(),
+            }
         })
     }
 }

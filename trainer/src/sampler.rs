@@ -22,7 +22,8 @@ use thiserror::Error;
 /// Draws minibatches from prepared shapes.
 pub struct Sampler<'a> {
     shapes: &'a [PreparedShape],
-    /// Source and target of every pair that corresponds, both directions, of each group; groups are drawn equally often.
+    /// Source and target of every pair that corresponds, both directions, of each group; a group is drawn as often as it has
+    /// shapes.
     pairs: Vec<Vec<(usize, usize)>>,
     config: &'a TrainConfig,
 }
@@ -117,8 +118,8 @@ impl<'a> Sampler<'a> {
     }
 
     fn pair(&self, rng: &mut ChaCha8Rng) -> Result<PairBatch, SamplerError> {
-        let group = if self.pairs.len() > 1 { rng.random_range(0..self.pairs.len()) } else { 0 };
-        let &(source, target) = self.pairs[group].choose(rng).expect("a group has pairs");
+        let group = self.draw_group(rng);
+        let &(source, target) = group.choose(rng).expect("a group has pairs");
         let (source, target) = (&self.shapes[source], &self.shapes[target]);
         let target_arrays = target.arrays()?;
         let (common, all) = self.draw(source, target, &target_arrays.mass, rng);
@@ -142,6 +143,23 @@ impl<'a> Sampler<'a> {
             false => None,
         };
         Ok(PairBatch { source, target, source_is_part, negatives, ground_truth, assignment })
+    }
+
+    /// The pairs of a group. `m` shapes make about `m^2` pairs.
+    fn draw_group(&self, rng: &mut ChaCha8Rng) -> &[(usize, usize)] {
+        let [one] = &self.pairs[..] else {
+            let shapes = |pairs: &Vec<(usize, usize)>| (pairs.len() as f64).sqrt();
+            let total: f64 = self.pairs.iter().map(shapes).sum();
+            let mut left = rng.random_range(0.0..total);
+            for pairs in &self.pairs {
+                left -= shapes(pairs);
+                if left < 0.0 {
+                    return pairs;
+                }
+            }
+            return &self.pairs[self.pairs.len() - 1];
+        };
+        one
     }
 
     /// Points that both shapes have, ascending; of their pools, where distances between them are needed or points are all

@@ -407,8 +407,10 @@ mod tests {
         let metadata = ModelMetadata::example();
         let pairs = metadata.to_pairs().into_iter();
         let model = Model {
+            producer_name: String::new(),
             graph: Some(Graph {
                 node: vec![Node { output: vec![name.into()], op_type: "Identity".into() }],
+                initializer: Vec::new(),
                 input: vec![value("shot")],
                 output: vec![value(OUTPUT)],
             }),

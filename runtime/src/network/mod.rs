@@ -1,9 +1,11 @@
 //! The descriptor network: the model file's contract, and its back-ends.
 //!
-//! A model is an ONNX file ([`contract`]). It runs through tract, which is built in (feature `tract`), or through onnxruntime
+//! A model is an ONNX file ([`contract`]). The DiffusionNets that `fmnet-train` writes run on the library's own kernels
+//! ([`NativeNetwork`]); any model runs through tract, which is built in (feature `tract`), or through onnxruntime
 //! (feature `ort`), whose library is loaded at run time from the path in the environment variable `ORT_DYLIB_PATH`.
 
 pub mod contract;
+mod native;
 #[cfg(feature = "ort")]
 mod ort;
 mod proto;
@@ -12,6 +14,7 @@ mod tract;
 
 use crate::Matrix;
 use contract::{Contract, ModelInput, ModelMetadata};
+pub use native::{NativeInput, NativeNetwork};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -21,8 +24,10 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
-    /// tract, pure Rust, built in.
+    /// The library's own kernels, for the DiffusionNets that `fmnet-train` writes; tract for all other models.
     #[default]
+    Native,
+    /// tract, pure Rust, built in.
     Tract,
     /// onnxruntime, its library, named by ORT_DYLIB_PATH, loaded at run time; needs the feature `ort`.
     Ort,
@@ -31,6 +36,7 @@ pub enum Backend {
 impl fmt::Display for Backend {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
+            Self::Native => "native",
             Self::Tract => "tract",
             Self::Ort => "ort",
         })
@@ -99,6 +105,7 @@ pub struct DescriptorNetwork {
     fingerprint: [u8; 32],
     backend: Backend,
     engine: Box<dyn Engine>,
+    native: Option<NativeNetwork>,
 }
 
 /// What a back-end does. Results may differ between back-ends by rounding only.
@@ -141,12 +148,17 @@ impl DescriptorNetwork {
     /// If the file breaks the contract, the back-end is not in this build, or refuses the model.
     pub fn from_bytes(path: &Path, bytes: &[u8], backend: Backend) -> Result<Self, NetworkError> {
         let contract = contract::read_contract(path, bytes)?;
-        let engine = load_engine(bytes, &contract, backend).map_err(|failure| match failure {
+        let native = NativeNetwork::read(bytes, &contract);
+        let backend = match (backend, &native) {
+            (Backend::Native, None) => Backend::Tract,
+            (chosen, _) => chosen,
+        };
+        let engine = load_engine(bytes, &contract, native.as_ref(), backend).map_err(|failure| match failure {
             Failure::Absent => NetworkError::BackendAbsent { backend },
             Failure::Refused(reason) => NetworkError::Backend { path: path.to_path_buf(), backend, reason },
         })?;
         let fingerprint = *blake3::hash(bytes).as_bytes();
-        Ok(Self { path: path.to_path_buf(), contract, fingerprint, backend, engine })
+        Ok(Self { path: path.to_path_buf(), contract, fingerprint, backend, engine, native })
     }
 
     /// What travels with the model.
@@ -162,6 +174,11 @@ impl DescriptorNetwork {
     /// A hash of the model file, for cache keys.
     pub fn fingerprint(&self) -> &[u8; 32] {
         &self.fingerprint
+    }
+
+    /// The network in the library's own kernels, if it is a DiffusionNet that `fmnet-train` wrote.
+    pub fn native(&self) -> Option<&NativeNetwork> {
+        self.native.as_ref()
     }
 
     /// The back-end it runs on.
@@ -209,8 +226,14 @@ enum Failure {
 }
 
 #[cfg_attr(not(any(feature = "tract", feature = "ort")), allow(unused_variables))]
-fn load_engine(bytes: &[u8], contract: &Contract, backend: Backend) -> Result<Box<dyn Engine>, Failure> {
+fn load_engine(
+    bytes: &[u8],
+    contract: &Contract,
+    native: Option<&NativeNetwork>,
+    backend: Backend,
+) -> Result<Box<dyn Engine>, Failure> {
     match backend {
+        Backend::Native => native.map(|native| Box::new(native.clone()) as Box<dyn Engine>).ok_or(Failure::Absent),
         #[cfg(feature = "tract")]
         Backend::Tract => Ok(Box::new(tract::TractEngine::load(bytes, contract).map_err(Failure::Refused)?)),
         #[cfg(feature = "ort")]
@@ -242,6 +265,7 @@ mod tests {
             fingerprint: [0; 32],
             backend: Backend::Tract,
             engine: Box::new(Failing),
+            native: None,
         };
         let error = |len| network.descriptors(4, &[&vec![0.0; len]]).unwrap_err().to_string();
         assert_eq!(error(12), "m.onnx: tract: no");

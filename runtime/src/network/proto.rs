@@ -7,6 +7,8 @@ use prost::Message;
 /// `ModelProto`.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Model {
+    #[prost(string, tag = "2")]
+    pub(super) producer_name: String,
     #[prost(message, optional, tag = "7")]
     pub(super) graph: Option<Graph>,
     #[prost(message, repeated, tag = "8")]
@@ -38,6 +40,8 @@ pub(super) struct StringEntry {
 pub(super) struct Graph {
     #[prost(message, repeated, tag = "1")]
     pub(super) node: Vec<Node>,
+    #[prost(message, repeated, tag = "5")]
+    pub(super) initializer: Vec<Tensor>,
     #[prost(message, repeated, tag = "11")]
     pub(super) input: Vec<ValueInfo>,
     #[prost(message, repeated, tag = "12")]
@@ -51,6 +55,19 @@ pub(super) struct Node {
     pub(super) output: Vec<String>,
     #[prost(string, tag = "4")]
     pub(super) op_type: String,
+}
+
+/// `TensorProto`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Tensor {
+    #[prost(int64, repeated, tag = "1")]
+    pub(super) dims: Vec<i64>,
+    #[prost(int32, tag = "2")]
+    pub(super) data_type: i32,
+    #[prost(string, tag = "8")]
+    pub(super) name: String,
+    #[prost(bytes = "vec", tag = "9")]
+    pub(super) raw_data: Vec<u8>,
 }
 
 /// `ValueInfoProto`.

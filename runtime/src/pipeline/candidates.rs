@@ -1,14 +1,19 @@
 //! Other ways to the map of a pair, tried where the first looks wrong; the best by its quality is taken.
 
+use super::adapt::adapted;
 use super::pair::{Found, Judge, Pair};
 use super::{Effort, Refinement};
 use crate::Matrix;
 use crate::error::Error;
 use crate::fmap::{FmapSolver, SolverKind, functional_maps};
+use crate::network::NativeNetwork;
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::quality::{Estimate, Quality};
 use crate::refine::WaveletOptions;
 use serde::{Deserialize, Serialize};
+
+/// Steps of the adaptation of a doubtful pair.
+const ADAPTATION: usize = 10;
 
 /// A map before refinement, both ways.
 pub(super) struct Start {
@@ -68,13 +73,18 @@ impl Pair<'_> {
         let mut tried = Tried::first("default", found, judged);
         let wanted = match self.matcher.effort {
             Effort::Low => false,
-            Effort::Normal => tried.estimate.doubtful,
+            Effort::Normal => tried.estimate.doubtful || self.matcher.adapt.is_some_and(|steps| steps > 0),
             Effort::High => true,
         };
         // Other refinements were asked for by name, and a part has no map back.
         if !wanted || self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
             return Ok(tried);
         }
+        self.try_others(judge, start, &mut tried)?;
+        Ok(tried)
+    }
+
+    fn try_others(&self, judge: &Judge, start: &Start, tried: &mut Tried) -> Result<(), Error> {
         let (matcher, k) = (self.matcher, self.refined_k());
         let rough = WaveletOptions::coarse_to_fine(matcher.k, k);
         let mut attempt = |name: &str, found: Result<Found, Error>| -> Result<(), Error> {
@@ -88,10 +98,23 @@ impl Pair<'_> {
         attempt("features alone", self.refine(Refinement::Wavelet, &features))?;
         attempt("features alone, coarse to fine", self.wavelet(&features, &rough))?;
         for (name, k, weight) in [("k = 50", 50, 0.1), ("strong mask", matcher.k, 1.0)] {
-            let start = self.solved_again(k.min(matcher.k), weight)?;
+            let own = [&self.source.descriptors, &self.target.descriptors];
+            let start = self.solved(own, k.min(matcher.k), weight)?;
             attempt(name, self.wavelet(&start, &rough))?;
         }
-        Ok(tried)
+        if let Some((network, steps)) = self.adaptation() {
+            let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
+            let start = self.solved([&source, &target], matcher.k, 0.1)?;
+            attempt("adapted", self.refine(Refinement::Wavelet, &start))?;
+            attempt("adapted, coarse to fine", self.wavelet(&start, &rough))?;
+        }
+        Ok(())
+    }
+
+    /// The network that can be adapted, and for how many steps.
+    fn adaptation(&self) -> Option<(&NativeNetwork, usize)> {
+        let steps = self.matcher.adapt.unwrap_or(ADAPTATION);
+        Some((self.matcher.network()?.native()?, steps)).filter(|(_, steps)| *steps > 0)
     }
 
     /// Nearest neighbours among the descriptors, without a functional map.
@@ -104,11 +127,11 @@ impl Pair<'_> {
         Ok(Start { functional_map, map, back, embedding })
     }
 
-    /// The functional maps at another `k` or weight of the mask.
-    fn solved_again(&self, k: usize, weight: f64) -> Result<Start, Error> {
+    /// The functional maps of descriptors at another `k` or weight of the mask.
+    fn solved(&self, descriptors: [&Matrix<f32>; 2], k: usize, weight: f64) -> Result<Start, Error> {
         let bases = self.bases(k)?;
-        let f = bases[0].project(&self.source.descriptors);
-        let g = bases[1].project(&self.target.descriptors);
+        let f = bases[0].project(descriptors[0]);
+        let g = bases[1].project(descriptors[1]);
         let solver = FmapSolver::new(SolverKind::Joint, Some(weight));
         let (maps, _) = functional_maps(&bases[0], &bases[1], &f, &g, solver)?;
         self.start(&maps, Comparison::Joint, &bases)

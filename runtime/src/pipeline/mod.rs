@@ -10,6 +10,7 @@
 //!
 //! All is done on the decimated shapes; only the last step sees the full ones.
 
+mod adapt;
 mod candidates;
 mod descriptor;
 mod finish;
@@ -87,6 +88,7 @@ pub struct Matcher {
     refinement: Option<Refinement>,
     upscaling: Upscaling,
     effort: Effort,
+    adapt: Option<usize>,
     calibration: Calibration,
     shot: ShotOptions,
     network: Option<NetworkDescriptor>,
@@ -127,6 +129,7 @@ impl Matcher {
             refinement: options.refinement.or(by_default),
             upscaling: options.upscaling,
             effort: options.effort,
+            adapt: options.adapt,
             calibration: metadata.and_then(|m| m.calibration).unwrap_or_default(),
             shot,
             network: network.map(|network| NetworkDescriptor { network, shot }),

@@ -123,6 +123,9 @@ pub struct MatchOptions {
     pub upscaling: Upscaling,
     /// How much is tried to find a good map. Default: other ways where the first map is doubtful.
     pub effort: Effort,
+    /// Steps by which the network is adapted to the pair, 0 for none. Default: 10 where the first map is doubtful, else none. Only for
+    /// models that [`crate::network::DescriptorNetwork::native`] knows.
+    pub adapt: Option<usize>,
     /// Folder of results kept for each shape; `None`, the default: nothing is kept.
     pub cache: Option<PathBuf>,
 }

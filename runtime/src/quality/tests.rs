@@ -81,7 +81,7 @@ fn doubt_is_where_the_map_is_wrong() {
         values.iter().sum::<f32>() / values.len() as f32
     };
     assert!(mean(&mut wrong.iter().copied()) > 0.6);
-    assert!(mean(&mut (0..n).filter(|&v| source.mesh.vertices()[v][2] < 1.0)) < 0.02);
+    assert!(mean(&mut (0..n).filter(|&v| source.mesh.vertices()[v][2] < 0.0)) < 0.02);
     map.targets[0] = PointMap::UNMATCHED;
     assert_eq!(super::doubt(&map, None, source.side(), source.side())[0], 1.0);
     let calibration = Calibration::default();

@@ -61,7 +61,7 @@ pub(crate) struct ShapeArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) model: Option<PathBuf>,
     /// What computes the network
-    #[arg(long, value_enum, default_value = "tract")]
+    #[arg(long, value_enum, default_value = "native")]
     pub(crate) backend: Backend,
     /// Learned descriptors, or SHOT without a network (the paper's baseline)
     #[arg(long, value_enum, default_value = "learned")]
@@ -100,6 +100,10 @@ pub(crate) struct PipelineArgs {
     /// How many ways to a map are tried; the one that looks best is taken
     #[arg(long, value_enum, default_value = "normal")]
     pub(crate) effort: Effort,
+    /// Adapt the network to the pair by so many steps, 0 to 100, about half a second each; the map is taken if it looks better
+    /// [default: 10 where the first map is doubtful, else 0]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=100))]
+    pub(crate) adapt: Option<u16>,
 }
 
 #[derive(Debug, Args)]
@@ -298,6 +302,7 @@ impl PipelineArgs {
             refinement: self.refine,
             upscaling: self.upscale,
             effort: self.effort,
+            adapt: self.adapt.map(usize::from),
             ..self.shape.to_options()
         }
     }
