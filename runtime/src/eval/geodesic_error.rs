@@ -2,6 +2,7 @@
 
 use super::{ErrorSummary, EvalError, GroundTruth, check_size};
 use crate::geodesic::GeodesicSolver;
+use crate::mesh::{Mesh, SurfacePoint, vec3, vertices_on_surface};
 use crate::point_map::PointMap;
 
 /// Normalised geodesic error `d_Y(y, y*) / sqrt(area(Y))` of each correct match `(x, y*)` of the ground truth, in its
@@ -40,6 +41,95 @@ pub fn geodesic_errors(
     Ok(matches().map(|(y, _)| y.and_then(|_| distances.next()).map_or(f32::NAN, error)).collect())
 }
 
+/// As [`geodesic_errors`], of the points on the target's surface that the map and the ground truth name; where one knows vertices only, of
+/// these.
+///
+/// Within a triangle the distance is the straight line; else it is the mean over the corners of both by their weights, which overrates
+/// short distances by less than an edge. `mesh` is the target.
+///
+/// # Errors
+/// As [`geodesic_errors`], and if a point names a triangle that does not exist.
+pub fn surface_errors(
+    map: &PointMap,
+    ground_truth: &GroundTruth,
+    mesh: &Mesh,
+    solver: &GeodesicSolver,
+) -> Result<Vec<f32>, EvalError> {
+    check_size("the map", map.len(), "the source of the ground truth", ground_truth.n_source())?;
+    check_size("the target of the map", map.n_target, "the target mesh", mesh.n_vertices())?;
+    let beyond = |point: &&SurfacePoint| point.face as usize >= mesh.n_faces();
+    if let Some(point) = map.points.iter().flatten().flatten().find(beyond) {
+        let (index, n_vertices) = (point.face, mesh.n_faces());
+        return Err(EvalError::IndexOutOfRange { what: "a point of the map", side: "face of the target", index, n_vertices });
+    }
+    let vertices = vertices_on_surface(mesh);
+    let found = |x: u32| match &map.points {
+        Some(points) => points[x as usize],
+        None => map.get(x as usize).and_then(|y| vertices[y as usize]),
+    };
+    let right = |i: usize, y: u32| match ground_truth.points() {
+        Some(points) => Some(points[i]),
+        None => vertices[y as usize],
+    };
+    let measured: Vec<Option<Between>> = ground_truth
+        .pairs()
+        .iter()
+        .enumerate()
+        .map(|(i, &(x, y))| Some(Between::new(found(x)?, right(i, y)?, mesh)))
+        .collect();
+    let asked: Vec<(u32, u32)> = measured.iter().flatten().flat_map(|between| between.pairs()).collect();
+    let mut distances = solver.pair_distances(&asked).into_iter();
+    let unit = mesh.scale();
+    let error = |between: &Option<Between>| match between {
+        None => f32::NAN,
+        Some(between) => (between.distance(&mut distances) / unit) as f32,
+    };
+    Ok(measured.iter().map(error).collect())
+}
+
+/// The distance of two points on a mesh, given those of vertices.
+enum Between {
+    Straight(f64),
+    /// Pairs of corners and the weight of each.
+    ByCorners(Vec<((u32, u32), f64)>),
+}
+
+impl Between {
+    fn new(a: SurfacePoint, b: SurfacePoint, mesh: &Mesh) -> Self {
+        let corners = |point: SurfacePoint| -> Vec<(u32, f64)> {
+            let corners = mesh.faces()[point.face as usize];
+            corners.into_iter().zip(point.weights).filter(|(_, w)| *w > 0.0).collect()
+        };
+        let (from, to) = (corners(a), corners(b));
+        let within = |corners: &[(u32, f64)], face: u32| {
+            corners.iter().all(|(v, _)| mesh.faces()[face as usize].contains(v))
+        };
+        if within(&from, b.face) || within(&to, a.face) {
+            return Self::Straight(vec3::distance(a.position(mesh), b.position(mesh)));
+        }
+        let pairs = from.iter().flat_map(|&(v, p)| to.iter().map(move |&(w, q)| ((v, w), p * q)));
+        Self::ByCorners(pairs.collect())
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let pairs: &[((u32, u32), f64)] = match self {
+            Self::Straight(_) => &[],
+            Self::ByCorners(pairs) => pairs,
+        };
+        pairs.iter().map(|(pair, _)| *pair)
+    }
+
+    /// Takes the distances of its pairs from the front of all.
+    fn distance(&self, distances: &mut impl Iterator<Item = f32>) -> f64 {
+        match self {
+            Self::Straight(distance) => *distance,
+            Self::ByCorners(pairs) => {
+                pairs.iter().zip(distances).map(|((_, weight), d)| weight * f64::from(d)).sum()
+            }
+        }
+    }
+}
+
 /// The errors under the better of two ground truths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SymmetricErrors {
@@ -72,7 +162,6 @@ pub fn symmetric_geodesic_errors(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Mesh;
     use crate::geodesic::GeodesicOptions;
 
     /// Two unit squares side by side, and a triangle apart: vertices 0-5 and 6-8.
@@ -82,6 +171,30 @@ mod tests {
         let faces = vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [6, 7, 8]];
         let mesh = Mesh::new(vertices, faces).unwrap();
         (GeodesicSolver::new(&mesh, &GeodesicOptions::default()), mesh.area())
+    }
+
+    #[test]
+    fn points_on_the_surface_are_measured_on_it() {
+        let vertices = (0..6).map(|i| [f64::from(i % 3), f64::from(i / 3), 0.0]).collect();
+        let mesh = Mesh::new(vertices, vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]).unwrap();
+        let solver = GeodesicSolver::new(&mesh, &GeodesicOptions::default());
+        let unit = 2f64.sqrt();
+        let middle = SurfacePoint { face: 0, weights: [0.5, 0.5, 0.0] };
+        let far = SurfacePoint { face: 2, weights: [0.0, 1.0, 0.0] };
+        let truth = GroundTruth::of_points(&[Some(middle), Some(middle), None, Some(far)], &mesh);
+        assert_eq!(truth.pairs(), [(0, 0), (1, 0), (3, 2)]);
+        let points = vec![Some(middle), Some(SurfacePoint::at_corner(0, 1)), Some(far), Some(middle)];
+        let map = PointMap { points: Some(points), ..PointMap::new(vec![0, 1, 2, 0], 6) };
+        let errors = surface_errors(&map, &truth, &mesh, &solver).unwrap();
+        for (error, expected) in errors.iter().zip([0.0, 0.5, 1.5]) {
+            assert!((f64::from(*error) * unit - expected).abs() < 1e-6, "{errors:?}");
+        }
+        // By its vertices the same map is half an edge off.
+        let coarse = PointMap { points: None, ..map.clone() };
+        let errors = surface_errors(&coarse, &truth, &mesh, &solver).unwrap();
+        assert!((f64::from(errors[0]) * unit - 0.5).abs() < 1e-6);
+        let beyond = PointMap { points: Some(vec![Some(SurfacePoint::at_corner(4, 0)); 4]), ..map };
+        assert!(surface_errors(&beyond, &truth, &mesh, &solver).is_err());
     }
 
     #[test]

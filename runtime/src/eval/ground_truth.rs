@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::EvalError;
-use crate::io::{path_from_bytes, read_point_map};
+use crate::Mesh;
+use crate::io::{path_from_bytes, read_point_map, read_surface_points};
+use crate::mesh::SurfacePoint;
 use crate::point_map::PointMap;
 
 /// Correct matches between a source and a target, as pairs of 0-based vertices.
@@ -15,6 +17,8 @@ use crate::point_map::PointMap;
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundTruth {
     pairs: Vec<(u32, u32)>,
+    /// The right point on the target's surface of each pair, whose target vertex then is the corner of largest weight.
+    points: Option<Vec<SurfacePoint>>,
     n_source: usize,
     n_target: usize,
 }
@@ -26,7 +30,8 @@ pub enum GroundTruthSource {
     Identity,
     /// `identity:N`: the first N vertices correspond, vertex i with vertex i.
     FirstVertices(usize),
-    /// `FILE`: a map file from source to target.
+    /// `FILE`: a map file from source to target, or points on the target's surface, one for each source vertex (`.corr`,
+    /// `.baryc_gt`).
     Map(PathBuf),
     /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex).
     Lists(PathBuf, PathBuf),
@@ -75,11 +80,22 @@ impl GroundTruthSource {
         }
     }
 
-    /// The correct matches between meshes of `n_source` and `n_target` vertices.
+    /// The correct matches between two meshes.
     ///
     /// # Errors
     /// If a file cannot be read, or what it says does not fit the meshes.
-    pub fn load(&self, n_source: usize, n_target: usize) -> Result<GroundTruth, EvalError> {
+    pub fn load(&self, source: &Mesh, target: &Mesh) -> Result<GroundTruth, EvalError> {
+        match self {
+            Self::Map(file) if holds_points(file) => {
+                let points = read_surface_points(file, target.n_faces())?;
+                super::check_size("the ground truth", points.len(), "the source", source.n_vertices())?;
+                Ok(GroundTruth::of_points(&points, target))
+            }
+            _ => self.load_vertices(source.n_vertices(), target.n_vertices()),
+        }
+    }
+
+    fn load_vertices(&self, n_source: usize, n_target: usize) -> Result<GroundTruth, EvalError> {
         match self {
             Self::Identity if n_source != n_target => Err(EvalError::NoIdentity { n_source, n_target }),
             Self::Identity => GroundTruth::first_vertices(n_source, n_source, n_target),
@@ -107,6 +123,11 @@ impl GroundTruthSource {
     }
 }
 
+/// Whether a file is a list of points on a surface.
+fn holds_points(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("corr") || e.eq_ignore_ascii_case("baryc_gt"))
+}
+
 impl GroundTruth {
     /// Correct matches as (source vertex, target vertex).
     ///
@@ -121,12 +142,31 @@ impl GroundTruth {
                 }
             }
         }
-        Ok(Self { pairs, n_source, n_target })
+        Ok(Self { pairs, points: None, n_source, n_target })
+    }
+
+    /// Source vertex i corresponds with point i on the target, where there is one.
+    ///
+    /// # Panics
+    /// If the target has no such triangle.
+    pub fn of_points(points: &[Option<SurfacePoint>], target: &Mesh) -> Self {
+        let known = || points.iter().enumerate().filter_map(|(x, point)| Some((x as u32, (*point)?)));
+        Self {
+            pairs: known().map(|(x, point)| (x, point.nearest_vertex(target))).collect(),
+            points: Some(known().map(|(_, point)| point).collect()),
+            n_source: points.len(),
+            n_target: target.n_vertices(),
+        }
+    }
+
+    /// The right points on the target's surface, one for each of [`GroundTruth::pairs`], where they are known finer than a vertex.
+    pub fn points(&self) -> Option<&[SurfacePoint]> {
+        self.points.as_deref()
     }
 
     /// Vertex i corresponds with vertex i, for all `n` vertices of both meshes.
     pub fn identity(n: usize) -> Self {
-        Self { pairs: (0..n as u32).map(|i| (i, i)).collect(), n_source: n, n_target: n }
+        Self { pairs: (0..n as u32).map(|i| (i, i)).collect(), points: None, n_source: n, n_target: n }
     }
 
     /// The correct matches that a point map states.
@@ -190,11 +230,11 @@ mod tests {
 
     #[test]
     fn identity_needs_one_size() {
-        assert_eq!(GroundTruthSource::Identity.load(3, 3).unwrap(), GroundTruth::identity(3));
-        assert!(matches!(GroundTruthSource::Identity.load(3, 4), Err(EvalError::NoIdentity { .. })));
-        assert_eq!(GroundTruthSource::FirstVertices(2).load(3, 4).unwrap().pairs(), &[(0, 0), (1, 1)]);
+        assert_eq!(GroundTruthSource::Identity.load_vertices(3, 3).unwrap(), GroundTruth::identity(3));
+        assert!(matches!(GroundTruthSource::Identity.load_vertices(3, 4), Err(EvalError::NoIdentity { .. })));
+        assert_eq!(GroundTruthSource::FirstVertices(2).load_vertices(3, 4).unwrap().pairs(), &[(0, 0), (1, 1)]);
         assert!(matches!(
-            GroundTruthSource::FirstVertices(4).load(3, 4),
+            GroundTruthSource::FirstVertices(4).load_vertices(3, 4),
             Err(EvalError::IndexOutOfRange { side: "source", index: 3, .. })
         ));
     }
@@ -207,16 +247,16 @@ mod tests {
             folder.path().join(name)
         };
         let (a, b) = (file("a.vts", "3\n1\n3\n"), file("b.vts", "1\n2\n2\n"));
-        let lists = GroundTruthSource::Lists(a.clone(), b).load(3, 2).unwrap();
+        let lists = GroundTruthSource::Lists(a.clone(), b).load_vertices(3, 2).unwrap();
         assert_eq!(lists.pairs(), &[(2, 0), (0, 1), (2, 1)]);
         assert_eq!(lists.to_map().targets, [1, PointMap::UNMATCHED, 1]);
         let short = file("c.vts", "1\n");
         assert!(matches!(
-            GroundTruthSource::Lists(a, short).load(3, 2),
+            GroundTruthSource::Lists(a, short).load_vertices(3, 2),
             Err(EvalError::ListMismatch { n_source: 3, n_target: 1, .. })
         ));
         let map = GroundTruthSource::Map(file("map.txt", "1\n-1\n0\n"));
-        assert_eq!(map.load(3, 2).unwrap().pairs(), &[(0, 1), (2, 0)]);
-        assert!(matches!(map.load(4, 2), Err(EvalError::SizeMismatch { found: 3, expected: 4, .. })));
+        assert_eq!(map.load_vertices(3, 2).unwrap().pairs(), &[(0, 1), (2, 0)]);
+        assert!(matches!(map.load_vertices(4, 2), Err(EvalError::SizeMismatch { found: 3, expected: 4, .. })));
     }
 }

@@ -19,7 +19,7 @@ mod summary;
 pub use chart::{AxisScale, LineChart, Series};
 pub use cmc::{cmc_curve, correct_match_distances, match_ranks};
 pub use curve::{ErrorCurve, curves_csv, curves_from_csv};
-pub use geodesic_error::{SymmetricErrors, geodesic_errors, symmetric_geodesic_errors};
+pub use geodesic_error::{SymmetricErrors, geodesic_errors, surface_errors, symmetric_geodesic_errors};
 pub use ground_truth::{GroundTruth, GroundTruthSource};
 pub use histogram::Histogram;
 pub use report::{Block, HtmlReport, Section};

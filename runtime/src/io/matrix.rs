@@ -188,6 +188,33 @@ pub fn write_vector<T: NpyNumber>(path: &Path, vector: &[T]) -> Result<(), IoErr
     write(path, &format!("({},)", vector.len()), vector)
 }
 
+/// The bytes of a `.npy` file of an array.
+pub(super) fn encode<T: NpyNumber>(shape: &[usize], data: &[T]) -> Vec<u8> {
+    let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
+    let shape = if shape.len() == 1 { format!("({},)", sizes[0]) } else { format!("({})", sizes.join(", ")) };
+    let mut bytes = header::encode(T::DESCR, &shape);
+    data.iter().for_each(|x| x.put(&mut bytes));
+    bytes
+}
+
+/// Writes named arrays, as [`encode`] gives them, as `.npz`: a zip archive without compression.
+pub(super) fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<(), IoError> {
+    let written = || -> zip::result::ZipResult<Vec<u8>> {
+        let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        // The date of NumPy's own files, so that the same map gives the same bytes.
+        let stored = zip::write::SimpleFileOptions::default()
+            .compression_method(zip::CompressionMethod::Stored)
+            .last_modified_time(zip::DateTime::default());
+        for (name, bytes) in arrays {
+            archive.start_file(format!("{name}.npy"), stored)?;
+            std::io::Write::write_all(&mut archive, bytes)?;
+        }
+        Ok(archive.finish()?.into_inner())
+    };
+    let bytes = written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })?;
+    write_atomically(path, |w| w.write_all(&bytes))
+}
+
 fn write<T: NpyNumber>(path: &Path, shape: &str, data: &[T]) -> Result<(), IoError> {
     write_atomically(path, |w| {
         w.write_all(&header::encode(T::DESCR, shape))?;

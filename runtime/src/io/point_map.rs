@@ -5,13 +5,15 @@
 //! | `.txt` | one 0-based target index a line, as `numpy.loadtxt` takes it | -1 |
 //! | `.vts` | one 1-based target index a line, as in the FAUST and TOSCA correspondences | 0 |
 //! | `.npy` | int32 `[n_source]`, 0-based | -1 |
-//! | `.csv` | a comment with direction, base and sizes, then `source,target,confidence` | -1 |
+//! | `.csv` | a comment with direction, base and sizes, then `source,target,confidence` and, where the map is finer than a vertex, `face,u,v,w` | -1 |
+//! | `.npz` | arrays `targets`, `confidence`, `faces`, `weights` for NumPy; written only | -1 |
 
 use std::path::Path;
 
 use super::error::{ParseError, Parsed};
 use super::text::{Lines, Words, decode_text, float, integer, quote};
 use super::{IoError, matrix, write_atomically, write_vector};
+use crate::mesh::SurfacePoint;
 use crate::point_map::PointMap;
 
 /// A format of point map files.
@@ -25,11 +27,13 @@ pub enum PointMapFormat {
     Npy,
     /// `.csv`
     Csv,
+    /// `.npz`, which is written only.
+    Npz,
 }
 
 impl PointMapFormat {
     /// The extensions of point maps.
-    pub const EXTENSIONS: &'static str = ".txt, .vts, .npy, .csv";
+    pub const EXTENSIONS: &'static str = ".txt, .vts, .npy, .csv, .npz";
 
     /// The format that the extension of `path` names, whatever its case.
     pub fn from_path(path: &Path) -> Option<Self> {
@@ -38,6 +42,7 @@ impl PointMapFormat {
             "vts" => Some(Self::Vts),
             "npy" => Some(Self::Npy),
             "csv" => Some(Self::Csv),
+            "npz" => Some(Self::Npz),
             _ => None,
         }
     }
@@ -87,17 +92,47 @@ pub fn write_point_map(path: &Path, map: &PointMap) -> Result<(), IoError> {
             write_vector(path, &targets)
         }
         PointMapFormat::Csv => write_csv(path, map),
+        PointMapFormat::Npz => write_npz(path, map),
     }
+}
+
+/// `targets` int32 `[n]`, `confidence` float32 `[n]`, `faces` int32 `[n]`, `weights` float64 `[n, 3]`: what the map has of them.
+fn write_npz(path: &Path, map: &PointMap) -> Result<(), IoError> {
+    let index = |value: Option<u32>| value.map_or(Some(-1), |value| i32::try_from(value).ok());
+    let faces = |points: &Vec<Option<SurfacePoint>>| points.iter().map(|p| index(p.map(|p| p.face))).collect();
+    let targets: Option<Vec<i32>> = map.iter().map(index).collect();
+    let faces: Option<Option<Vec<i32>>> = map.points.as_ref().map(faces);
+    let (Some(targets), Some(faces)) = (targets, faces.map_or(Some(None), |faces| faces.map(Some))) else {
+        return Err(IoError::Unwritable {
+            path: path.into(),
+            problem: "an index does not fit int32".into(),
+            remedy: "write a .csv file",
+        });
+    };
+    let n = map.len();
+    let mut arrays = vec![("targets", matrix::encode(&[n], &targets))];
+    arrays.extend(map.confidence.as_ref().map(|values| ("confidence", matrix::encode(&[n], values))));
+    arrays.extend(faces.map(|faces| ("faces", matrix::encode(&[n], &faces))));
+    arrays.extend(map.points.as_ref().map(|points| {
+        let weights: Vec<f64> = points.iter().flat_map(|p| p.map_or([0.0; 3], |p| p.weights)).collect();
+        ("weights", matrix::encode(&[n, 3], &weights))
+    }));
+    matrix::write_npz(path, &arrays)
 }
 
 fn write_csv(path: &Path, map: &PointMap) -> Result<(), IoError> {
     write_atomically(path, |w| {
         writeln!(w, "# source->target, 0-based, n_source={}, n_target={}", map.len(), map.n_target)?;
-        writeln!(w, "source,target,confidence")?;
+        let finer = if map.points.is_some() { ",face,u,v,w" } else { "" };
+        writeln!(w, "source,target,confidence{finer}")?;
         for (source, target) in map.iter().enumerate() {
             write!(w, "{source},{},", target.map_or(-1, i64::from))?;
-            match map.confidence.as_ref().and_then(|c| c.get(source)) {
-                Some(confidence) => writeln!(w, "{confidence}")?,
+            if let Some(confidence) = map.confidence.as_ref().and_then(|c| c.get(source)) {
+                write!(w, "{confidence}")?;
+            }
+            match map.points.as_ref().map(|points| points.get(source).copied().flatten()) {
+                Some(Some(SurfacePoint { face, weights: [u, v, t] })) => writeln!(w, ",{face},{u},{v},{t}")?,
+                Some(None) => writeln!(w, ",-1,0,0,0")?,
                 None => writeln!(w)?,
             }
         }
@@ -115,6 +150,9 @@ pub(super) fn decode(bytes: &[u8], format: PointMapFormat, n_target: Option<usiz
         PointMapFormat::Vts => decode_lines(bytes, 1, n_target),
         PointMapFormat::Npy => decode_npy(bytes, n_target),
         PointMapFormat::Csv => decode_csv(bytes, n_target),
+        PointMapFormat::Npz => {
+            Err(ParseError::part("file", ".npz maps are not read; pass the .csv, or the targets as .npy"))
+        }
     }
 }
 
@@ -196,6 +234,8 @@ struct Table {
     given: Vec<bool>,
     confidence: Vec<f32>,
     has_confidence: bool,
+    points: Vec<Option<SurfacePoint>>,
+    has_points: bool,
 }
 
 impl Table {
@@ -257,11 +297,19 @@ impl Table {
             float(column)
                 .ok_or_else(|| words.error(format!("the confidence is not a number: {}", quote(column))))
         });
+        let point = match column() {
+            Some(face) => Some(point(number("face", Some(face))?, [column(), column(), column()], words)?),
+            None => None,
+        };
         self.resize((source + 1).max(self.targets.len()));
         if std::mem::replace(&mut self.given[source], true) {
             return Err(words.error(format!("source vertex {source} is there a second time")));
         }
         self.targets[source] = target;
+        if let Some(point) = point {
+            self.points[source] = point;
+            self.has_points = true;
+        }
         if let Some(confidence) = confidence.transpose()? {
             self.confidence[source] = confidence as f32;
             self.has_confidence = true;
@@ -273,11 +321,28 @@ impl Table {
         self.targets.resize(n_source, PointMap::UNMATCHED);
         self.given.resize(n_source, false);
         self.confidence.resize(n_source, 0.0);
+        self.points.resize(n_source, None);
     }
 
     fn finish(mut self) -> PointMap {
         self.resize(self.n_source.unwrap_or(self.targets.len()));
-        finish(self.targets, self.has_confidence.then_some(self.confidence), self.n_target)
+        let map = finish(self.targets, self.has_confidence.then_some(self.confidence), self.n_target);
+        PointMap { points: self.has_points.then_some(self.points), ..map }
+    }
+}
+
+/// A point on a triangle, -1 for none, by the three columns of its weights.
+fn point(face: i64, weights: [Option<&[u8]>; 3], words: &Words<'_>) -> Parsed<Option<SurfacePoint>> {
+    if face == -1 {
+        return Ok(None);
+    }
+    let face = u32::try_from(face).map_err(|_| words.error(format!("face {face} does not exist")))?;
+    let weights = weights.map(|column| float(column.unwrap_or_default()).filter(|w| (0.0..=1.0).contains(w)));
+    match weights {
+        [Some(u), Some(v), Some(w)] if (u + v + w - 1.0).abs() < 1e-3 => {
+            Ok(Some(SurfacePoint { face, weights: [u, v, w] }))
+        }
+        _ => Err(words.error("the weights u, v, w are not three numbers from 0 to 1 that sum to 1")),
     }
 }
 
@@ -290,7 +355,11 @@ mod tests {
         PointMap {
             targets: vec![2, PointMap::UNMATCHED, 0],
             confidence: Some(vec![0.5, 0.0, 1.0]),
-            points: None,
+            points: Some(vec![
+                Some(SurfacePoint { face: 7, weights: [0.25, 0.5, 0.25] }),
+                None,
+                Some(SurfacePoint::at_corner(0, 2)),
+            ]),
             n_target: 4,
         }
     }
@@ -302,9 +371,25 @@ mod tests {
             let path = folder.path().join(format!("map.{extension}"));
             write_point_map(&path, &map()).unwrap();
             let read = read_point_map(&path, Some(4)).unwrap();
-            let confidence = map().confidence.filter(|_| extension == "CSV");
-            assert_eq!(read, PointMap { confidence, ..map() });
+            let [confidence, points] = [extension == "CSV"; 2];
+            let confidence = map().confidence.filter(|_| confidence);
+            let points = map().points.filter(|_| points);
+            assert_eq!(read, PointMap { confidence, points, ..map() });
         }
+        let path = folder.path().join("map.npz");
+        write_point_map(&path, &map()).unwrap();
+        let mut archive = npyz::npz::NpzArchive::open(&path).unwrap();
+        let mut floats = |name: &str| -> (Vec<u64>, Vec<f64>) {
+            let array = archive.by_name(name).unwrap().unwrap();
+            (array.shape().to_vec(), array.into_vec().unwrap())
+        };
+        let (shape, weights) = floats("weights");
+        assert_eq!((shape, &weights[..4]), (vec![3, 3], &[0.25, 0.5, 0.25, 0.0][..]));
+        let faces: Vec<i32> = archive.by_name("faces").unwrap().unwrap().into_vec().unwrap();
+        assert_eq!(faces, [7, -1, 0]);
+        let targets: Vec<i32> = archive.by_name("targets").unwrap().unwrap().into_vec().unwrap();
+        assert_eq!(targets, [2, -1, 0]);
+        assert!(read_point_map(&path, None).unwrap_err().to_string().contains(".csv"));
         assert!(
             write_point_map(&folder.path().join("map.map"), &map()).unwrap_err().to_string().contains(".txt")
         );
@@ -312,8 +397,11 @@ mod tests {
         assert_eq!(std::fs::read_to_string(folder.path().join("map.vts")).unwrap(), "3\n0\n1\n");
         assert_eq!(
             std::fs::read_to_string(folder.path().join("map.CSV")).unwrap(),
-            "# source->target, 0-based, n_source=3, n_target=4\nsource,target,confidence\n0,2,0.5\n1,-1,0\n2,0,1\n"
+            "# source->target, 0-based, n_source=3, n_target=4\nsource,target,confidence,face,u,v,w\n\
+             0,2,0.5,7,0.25,0.5,0.25\n1,-1,0,-1,0,0,0\n2,0,1,0,0,0,1\n"
         );
+        let wrong = decode(b"source,target\n0,1,,3,0.9,0.9,0\n", Csv, None).unwrap_err();
+        assert!(format!("{wrong:?}").contains("sum to 1"));
     }
 
     #[test]

@@ -29,12 +29,12 @@ pub struct Estimate {
 }
 
 impl Default for Calibration {
-    /// Fitted on maps of several models between bodies of many makers.
+    /// Fitted on 715 maps, 115 of them bad, of several models and refinements between people and animals of four makers.
     fn default() -> Self {
         Self {
-            error: [1.9, 0.35, 0.15, 0.05, 0.1, 0.05],
-            bad: [-3.0, 1.0, 1.0, 0.2, 0.5, 0.3],
-            doubtful: 0.5,
+            error: [3.722, 0.178, 0.090, 0.221, 0.191, 0.150],
+            bad: [10.927, 1.272, 0.489, 0.249, 0.346, 2.489],
+            doubtful: 0.7,
         }
     }
 }

@@ -71,8 +71,7 @@ struct Pair<'a> {
 impl Pair<'_> {
     fn truth(&self, option: &str, text: &OsStr) -> Result<GroundTruth> {
         let load = || {
-            let (n_source, n_target) = (self.source.1.n_vertices(), self.target.1.n_vertices());
-            let truth = GroundTruthSource::from_os_str(text)?.load(n_source, n_target)?;
+            let truth = GroundTruthSource::from_os_str(text)?.load(self.source.1, self.target.1)?;
             if truth.pairs().is_empty() {
                 bail!("it has no matches, so there is nothing to measure; name a file with some");
             }
