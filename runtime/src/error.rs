@@ -6,6 +6,7 @@ use crate::io::IoError;
 use crate::memory::MemoryError;
 use crate::mesh::{DecimateError, MeshError, RepairError};
 use crate::network::NetworkError;
+use crate::pipeline::LandmarkError;
 use crate::point_map::RecoverError;
 use crate::refine::RefineError;
 use crate::spectral::EigenError;
@@ -49,6 +50,9 @@ pub enum Error {
     /// The map cannot be upscaled.
     #[error(transparent)]
     Upscale(#[from] UpscaleError),
+    /// Landmarks are not on the shapes.
+    #[error(transparent)]
+    Landmark(#[from] LandmarkError),
     /// A stage would take more memory than there is.
     #[error(transparent)]
     Memory(#[from] MemoryError),

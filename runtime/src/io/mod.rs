@@ -28,6 +28,7 @@ mod carried;
 mod error;
 mod format;
 mod gltf;
+mod landmarks;
 mod matrix;
 mod obj;
 mod off;
@@ -45,6 +46,7 @@ pub use atomic::{remove_temporary_files, write_atomically};
 pub use attributes::{Attributes, IntegerField, IntegerKind, Joint, MeshFile, ReadInfo, Skin, Texture};
 pub use error::{IoError, Position};
 pub use format::MeshFormat;
+pub use landmarks::read_landmarks;
 pub use matrix::{
     NpyArray, NpyKind, NpyNumber, read_matrix, read_npy, read_vector, write_matrix, write_npy, write_vector,
 };

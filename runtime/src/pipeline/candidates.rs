@@ -1,11 +1,12 @@
 //! Other ways to the map of a pair, tried where the first looks wrong; the best by its quality is taken.
 
 use super::adapt::adapted;
+use super::landmarks::Landmarks;
 use super::pair::{Found, Judge, Pair};
 use super::{Effort, Refinement};
 use crate::Matrix;
 use crate::error::Error;
-use crate::fmap::{FmapSolver, SolverKind, functional_maps};
+use crate::fmap::{FmapSolver, SolverKind};
 use crate::network::NativeNetwork;
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::quality::{Estimate, Quality};
@@ -21,6 +22,8 @@ pub(super) struct Start {
     pub(super) map: PointMap,
     pub(super) back: PointMap,
     pub(super) embedding: Embedding,
+    /// Columns beside the embeddings of refinement.
+    pub(super) anchors: Option<Box<[Matrix; 2]>>,
 }
 
 /// One way that was tried, and what came of it.
@@ -68,6 +71,7 @@ impl Pair<'_> {
         judge: &Judge,
         start: &Start,
         found: Found,
+        landmarks: Option<&Landmarks>,
     ) -> Result<Tried, Error> {
         let judged = judge.judge(&found)?;
         let mut tried = Tried::first("default", found, judged);
@@ -80,11 +84,17 @@ impl Pair<'_> {
         if !wanted || self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
             return Ok(tried);
         }
-        self.try_others(judge, start, &mut tried)?;
+        self.try_others(judge, start, &mut tried, landmarks)?;
         Ok(tried)
     }
 
-    fn try_others(&self, judge: &Judge, start: &Start, tried: &mut Tried) -> Result<(), Error> {
+    fn try_others(
+        &self,
+        judge: &Judge,
+        start: &Start,
+        tried: &mut Tried,
+        landmarks: Option<&Landmarks>,
+    ) -> Result<(), Error> {
         let (matcher, k) = (self.matcher, self.refined_k());
         let rough = WaveletOptions::coarse_to_fine(matcher.k, k);
         let mut attempt = |name: &str, found: Result<Found, Error>| -> Result<(), Error> {
@@ -94,17 +104,17 @@ impl Pair<'_> {
             Ok(())
         };
         attempt("coarse to fine", self.wavelet(start, &rough))?;
-        let features = self.by_features()?;
+        let features = Start { anchors: start.anchors.clone(), ..self.by_features()? };
         attempt("features alone", self.refine(Refinement::Wavelet, &features))?;
         attempt("features alone, coarse to fine", self.wavelet(&features, &rough))?;
         for (name, k, weight) in [("k = 50", 50, 0.1), ("strong mask", matcher.k, 1.0)] {
             let own = [&self.source.descriptors, &self.target.descriptors];
-            let start = self.solved(own, k.min(matcher.k), weight)?;
+            let start = self.solved(own, k.min(matcher.k), weight, landmarks)?;
             attempt(name, self.wavelet(&start, &rough))?;
         }
         if let Some((network, steps)) = self.adaptation() {
             let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
-            let start = self.solved([&source, &target], matcher.k, 0.1)?;
+            let start = self.solved([&source, &target], matcher.k, 0.1, landmarks)?;
             attempt("adapted", self.refine(Refinement::Wavelet, &start))?;
             attempt("adapted, coarse to fine", self.wavelet(&start, &rough))?;
         }
@@ -124,17 +134,21 @@ impl Pair<'_> {
         let [map, back] = embedding.both()?;
         let [phi, psi] = self.bases(self.matcher.k)?;
         let functional_map = crate::fmap::functional_map_of(&map, &phi, &psi)?;
-        Ok(Start { functional_map, map, back, embedding })
+        Ok(Start { functional_map, map, back, embedding, anchors: None })
     }
 
     /// The functional maps of descriptors at another `k` or weight of the mask.
-    fn solved(&self, descriptors: [&Matrix<f32>; 2], k: usize, weight: f64) -> Result<Start, Error> {
+    fn solved(
+        &self,
+        descriptors: [&Matrix<f32>; 2],
+        k: usize,
+        weight: f64,
+        landmarks: Option<&Landmarks>,
+    ) -> Result<Start, Error> {
         let bases = self.bases(k)?;
-        let f = bases[0].project(descriptors[0]);
-        let g = bases[1].project(descriptors[1]);
         let solver = FmapSolver::new(SolverKind::Joint, Some(weight));
-        let (maps, _) = functional_maps(&bases[0], &bases[1], &f, &g, solver)?;
-        self.start(&maps, Comparison::Joint, &bases)
+        let (maps, _) = self.functional_maps(descriptors, &bases, solver, landmarks)?;
+        self.start(&maps, Comparison::Joint, &bases, landmarks)
     }
 }
 

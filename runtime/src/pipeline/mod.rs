@@ -14,6 +14,7 @@ mod adapt;
 mod candidates;
 mod descriptor;
 mod finish;
+mod landmarks;
 mod options;
 mod pair;
 
@@ -34,6 +35,7 @@ use std::path::Path;
 
 pub use candidates::Candidate;
 pub use descriptor::{Descriptor, NetworkDescriptor};
+pub use landmarks::LandmarkError;
 pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
@@ -253,9 +255,24 @@ impl Matcher {
         target: &DescribedShape,
         observer: Observer,
     ) -> Result<Match, Error> {
+        self.match_with_landmarks(source, target, &[], observer)
+    }
+
+    /// As [`Matcher::match_shapes`], with matches that are known: pairs of a vertex of the source's input and one of the target's. They are
+    /// kept exactly, and pull the rest of the map: in the functional map's system, and in refinement by the wavelet filter.
+    ///
+    /// # Errors
+    /// As [`Matcher::match_shapes`], and if a vertex does not exist or is on no surface.
+    pub fn match_with_landmarks(
+        &self,
+        source: &DescribedShape,
+        target: &DescribedShape,
+        landmarks: &[(u32, u32)],
+        observer: Observer,
+    ) -> Result<Match, Error> {
         let names = format!("{} -> {}", source.shape.name, target.shape.name);
         let pair = Pair { matcher: self, source, target, names: &names, context: self.context(observer) };
-        pair.run().map_err(|e| e.in_shape(&names))
+        pair.run(landmarks).map_err(|e| e.in_shape(&names))
     }
 }
 

@@ -1,8 +1,10 @@
 //! A pair on its way through the stages: functional maps, point map, refinement, judgement, the inputs' vertices.
 
 use super::candidates::{Start, Tried};
+use super::landmarks::Landmarks;
 use super::finish::{full_by_functional_map, on_inputs};
 use super::{DescribedShape, Match, Matcher, Refinement, Upscaling};
+use crate::Matrix;
 use crate::error::Error;
 use crate::events::{Event, timed};
 use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
@@ -76,25 +78,34 @@ impl Judge<'_> {
 }
 
 impl Pair<'_> {
-    pub(super) fn run(&self) -> Result<Match, Error> {
+    pub(super) fn run(&self, landmarks: &[(u32, u32)]) -> Result<Match, Error> {
         let (matcher, is_part) = (self.matcher, self.is_part());
+        let landmarks = match landmarks {
+            [] => None,
+            given => Some(Landmarks::new(self, given)?),
+        };
+        let landmarks = landmarks.as_ref();
         let solver = matcher.solver(is_part);
         let bases = self.bases(matcher.k)?;
-        let (maps, info) = self.functional_maps(&bases, solver)?;
+        let own = [&self.source.descriptors, &self.target.descriptors];
+        let (maps, info) = self.functional_maps(own, &bases, solver, landmarks)?;
         let refinement = matcher.refinement(is_part);
         let width = self.refined_k().max(matcher.k) * 2;
         let [n_source, n_target] = [&self.source.shape, &self.target.shape].map(|shape| shape.n());
         let needed = memory::search_bytes(n_source, n_target, width);
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
-        let start = self.timed("point map", || self.start(&maps, solver.comparison(), &bases))?;
+        let start = self.timed("point map", || self.start(&maps, solver.comparison(), &bases, landmarks))?;
         let found = self.refine(refinement, &start)?;
         let judge = self.timed("quality", || self.judge())?;
-        let tried = self.with_candidates(&judge, &start, found)?;
+        let tried = self.with_candidates(&judge, &start, found, landmarks)?;
         let Tried { found, quality, estimate, candidates } = tried;
         drop(reserved);
         self.say_what_looks_wrong(&quality, &estimate);
         let doubt = judge.doubt(&found);
-        let (map, upscale_info) = self.on_inputs(&found, &doubt)?;
+        let (mut map, upscale_info) = self.on_inputs(&found, &doubt)?;
+        if let Some(landmarks) = landmarks {
+            landmarks.keep(&mut map, &self.target.shape);
+        }
         Ok(Match {
             map,
             functional_map: maps.forth,
@@ -130,15 +141,20 @@ impl Pair<'_> {
         self.source.refined_k.min(self.target.refined_k)
     }
 
-    fn functional_maps(
+    /// The functional maps that take the descriptors of both shapes to each other, and the landmarks.
+    pub(super) fn functional_maps(
         &self,
+        descriptors: [&Matrix<f32>; 2],
         bases: &[Eigenbasis; 2],
         solver: FmapSolver,
+        landmarks: Option<&Landmarks>,
     ) -> Result<(BothMaps, FmapInfo), Error> {
         let (maps, info) = self.timed("functional map", || {
-            let f = bases[0].project(&self.source.descriptors);
-            let g = bases[1].project(&self.target.descriptors);
-            functional_maps(&bases[0], &bases[1], &f, &g, solver)
+            let mut hats = [bases[0].project(descriptors[0]), bases[1].project(descriptors[1])];
+            if let Some(landmarks) = landmarks {
+                hats = landmarks.beside_coefficients(hats, bases);
+            }
+            functional_maps(&bases[0], &bases[1], &hats[0], &hats[1], solver)
         })?;
         if info.rank < self.matcher.k {
             self.warn(&format!(
@@ -155,15 +171,26 @@ impl Pair<'_> {
         maps: &BothMaps,
         comparison: Comparison,
         bases: &[Eigenbasis; 2],
+        landmarks: Option<&Landmarks>,
     ) -> Result<Start, Error> {
-        let embedding = maps.embedding(comparison, &bases[0], &bases[1])?;
+        let mut embedding = maps.embedding(comparison, &bases[0], &bases[1])?;
+        let mut anchors = None;
+        if let Some(landmarks) = landmarks {
+            let rows = &embedding.source;
+            let mean_square = rows.data().iter().map(|x| x * x).sum::<f64>() / rows.rows() as f64;
+            let columns = landmarks.anchors(mean_square);
+            embedding = embedding.with_columns(&columns[0], &columns[1]);
+            // Refinement goes up to more eigenfunctions, whose rows are longer.
+            let longer = self.refined_k() as f64 / bases[0].k() as f64;
+            anchors = Some(Box::new(landmarks.anchors(longer * mean_square)));
+        }
         if comparison == Comparison::Joint {
             let [map, back] = embedding.both()?;
-            return Ok(Start { functional_map: maps.forth.clone(), map, back, embedding });
+            return Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors });
         }
         let map = embedding.forth()?;
         let back = maps.clone().reversed().point_map(comparison, &bases[1], &bases[0])?;
-        Ok(Start { functional_map: maps.forth.clone(), map, back, embedding })
+        Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors })
     }
 
     /// Refines a start up to [`Pair::refined_k`] eigenfunctions.
@@ -206,8 +233,9 @@ impl Pair<'_> {
 
     pub(super) fn wavelet(&self, start: &Start, options: &WaveletOptions) -> Result<Found, Error> {
         let [source, target] = self.bases(self.refined_k())?;
+        let options = WaveletOptions { anchors: start.anchors.clone(), ..options.clone() };
         let refined =
-            self.timed("wavelet", || wavelet([&start.map, &start.back], &source, &target, options))?;
+            self.timed("wavelet", || wavelet([&start.map, &start.back], &source, &target, &options))?;
         Ok(Found::in_embedding(refined.map, Some(refined.map_back), refined.embedding))
     }
 

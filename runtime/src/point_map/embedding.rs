@@ -76,6 +76,15 @@ impl Embedding {
         Ok(Self { source, target, factors: None })
     }
 
+    /// The same with further columns beside the rows, `[n_source, a]` and `[n_target, a]`, which count in every distance.
+    ///
+    /// # Panics
+    /// If they have not as many rows.
+    pub fn with_columns(&self, source: &Matrix, target: &Matrix) -> Self {
+        let factors = self.factors.as_ref().map(|[left, right]| [beside(left, source), beside(right, target)]);
+        Self { source: beside(&self.source, source), target: beside(&self.target, target), factors }
+    }
+
     /// For each source vertex the nearest target vertex, the lowest of several; the confidence is the cosine of the angle
     /// between their rows, negative ones as 0.
     ///

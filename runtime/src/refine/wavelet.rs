@@ -29,6 +29,9 @@ pub struct WaveletStage {
 pub struct WaveletOptions {
     /// One after the other. At least one; default 3 rounds at 200 eigenfunctions.
     pub stages: Vec<WaveletStage>,
+    /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: what is known
+    /// beforehand, such as landmarks. Default none.
+    pub anchors: Option<Box<[Matrix; 2]>>,
     /// Whether the source is a part of the target, which is refused: a part has no map back from all of the target. Default
     /// false.
     pub part: bool,
@@ -49,7 +52,7 @@ impl Default for WaveletOptions {
 impl WaveletOptions {
     /// Three rounds at `k` eigenfunctions: for a start that is right up to details.
     pub fn at(k: usize) -> Self {
-        Self { stages: vec![WaveletStage { k, rounds: 3 }], part: false }
+        Self { stages: vec![WaveletStage { k, rounds: 3 }], anchors: None, part: false }
     }
 
     /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 5 rounds at 60, 3 at 128, 2 at 200. For a start of
@@ -62,7 +65,7 @@ impl WaveletOptions {
         }
         let rounds = COARSE_TO_FINE[if stages.is_empty() { 0 } else { COARSE_TO_FINE.len() - 1 }].rounds;
         stages.push(WaveletStage { k: k_max, rounds });
-        Self { stages, part: false }
+        Self { stages, anchors: None, part: false }
     }
 }
 
@@ -123,12 +126,24 @@ pub fn wavelet(
     let mut truncated = bases.map(|basis| basis.truncated(rounds[0]));
     for &k in &rounds[..last] {
         let maps = filtered_maps(&images, &mut truncated, bases, k)?;
-        images = maps.embedding(Comparison::Joint, &truncated[0], &truncated[1])?.matches()?;
+        images = embedding(&maps, &truncated, options)?.matches()?;
     }
     let functional_maps = filtered_maps(&images, &mut truncated, bases, rounds[last])?;
-    let embedding = functional_maps.embedding(Comparison::Joint, &truncated[0], &truncated[1])?;
+    let embedding = embedding(&functional_maps, &truncated, options)?;
     let [map, map_back] = embedding.both()?;
     Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds } })
+}
+
+fn embedding(
+    maps: &BothMaps,
+    [source, target]: &[Eigenbasis; 2],
+    options: &WaveletOptions,
+) -> Result<Embedding, RefineError> {
+    let embedding = maps.embedding(Comparison::Joint, source, target)?;
+    Ok(match options.anchors.as_deref() {
+        Some([of_source, of_target]) => embedding.with_columns(of_source, of_target),
+        None => embedding,
+    })
 }
 
 /// The filtered functional maps, `[k, k]`, of a pair of point maps, between bases that are cut to `k` where they are not.

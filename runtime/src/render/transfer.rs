@@ -82,6 +82,21 @@ impl Donors {
         Self { places, ..self }
     }
 
+    /// The same with the places on the target's surface that the map itself names ([`PointMap::points`]), where the source
+    /// receives; as it is for a map without.
+    ///
+    /// # Panics
+    /// If a place is on no triangle of the target.
+    pub fn on_surface(mut self, map: &PointMap, target: &Mesh) -> Self {
+        for (place, point) in self.places.iter_mut().zip(map.points.iter().flatten()) {
+            *place = point.map(|point| Place {
+                blend: Blend { face: point.face, weights: point.weights },
+                corners: target.faces()[point.face as usize],
+            });
+        }
+        self
+    }
+
     /// Number of receiving vertices.
     pub fn len(&self) -> usize {
         self.nearest.len()

@@ -33,7 +33,13 @@ pub fn viewer_html(pair: &ViewerPair) -> String {
     let colors_target = position_colors(pair.target);
     let colors_source = map_colors(pair.map, &colors_target);
     let targets: Vec<i32> = (0..pair.map.len()).map(|i| pair.map.get(i).map_or(-1, |t| t as i32)).collect();
+    let doubt = pair.map.confidence.as_ref().map(|confidence| {
+        let colors: Vec<[u8; 4]> = confidence.iter().map(|&c| doubt_color(1.0 - c)).collect();
+        base64(bytemuck::cast_slice(&colors))
+    });
     let data = json!({
+        "doubt": doubt,
+        "confidence": pair.map.confidence.as_ref().map(|values| base64(bytemuck::cast_slice(values))),
         "title": pair.title,
         "caption": pair.caption,
         "source": shape(pair.name_source, pair.source, &colors_source),
@@ -43,6 +49,15 @@ pub fn viewer_html(pair: &ViewerPair) -> String {
     // "</" would end the script element early.
     let data = data.to_string().replace("</", "<\\/");
     TEMPLATE.replace("__TITLE__", &escaped(pair.title)).replace("__DATA__", &data)
+}
+
+/// From light grey, no doubt, by yellow to red.
+fn doubt_color(doubt: f32) -> [u8; 4] {
+    let stops = [[225.0, 225.0, 220.0], [250.0, 200.0, 60.0], [200.0, 30.0, 30.0]];
+    let at = 2.0 * doubt.clamp(0.0, 1.0);
+    let (low, share) = if at < 1.0 { (0, at) } else { (1, at - 1.0) };
+    let mix = |i: usize| (stops[low][i] + share * (stops[low + 1][i] - stops[low][i])) as u8;
+    [mix(0), mix(1), mix(2), 255]
 }
 
 fn shape(name: &str, mesh: &Mesh, colors: &[[u8; 4]]) -> serde_json::Value {
@@ -96,6 +111,13 @@ mod tests {
         {
             assert_eq!(base64(plain.as_bytes()), encoded);
         }
+    }
+
+    #[test]
+    fn doubt_goes_from_grey_to_red() {
+        assert_eq!(doubt_color(0.0), [225, 225, 220, 255]);
+        assert_eq!(doubt_color(0.5), [250, 200, 60, 255]);
+        assert_eq!(doubt_color(1.5), [200, 30, 30, 255]);
     }
 
     #[test]

@@ -130,6 +130,10 @@ pub(crate) struct MatchArgs {
     /// unit of length. Parts determine fewer eigenfunctions: try -k 70 where the map is poor
     #[arg(long)]
     pub(crate) partial: bool,
+    /// Matches that are known, kept exactly, which pull the rest of the map: a text file with a source vertex and a target vertex a
+    /// line, 0-based, or one vertex that both have; # begins a comment
+    #[arg(long, value_name = "FILE")]
+    pub(crate) landmarks: Option<PathBuf>,
     /// End with exit status 3 where the map is doubtful or mirrored; it is written all the same
     #[arg(long)]
     pub(crate) strict: bool,

@@ -1,14 +1,14 @@
 //! `fmnet-infer batch`: many pairs, each shape processed once.
 
 use super::map_key::{Made, MapKeys, forget_key, made_from, write_key};
-use super::matching::read;
+use super::matching::{quality, read};
 use super::output::{Inputs, create_folder, file_name};
 use super::pairs::{Pair, read_pairs};
 use crate::args::BatchArgs;
 use crate::console::{Console, causes, shown};
 use anyhow::{Result, bail};
 use fmnet::io::write_point_map;
-use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
+use fmnet::pipeline::{DescribedShape, Match, MatchOptions, Matcher};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,27 +27,37 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     let mut keys = MapKeys::new(&matcher, &options, args.partial);
     let mut shapes = Shapes { matcher: &matcher, kept: BTreeMap::new(), order: Vec::new() };
     let (mut done, mut renewed, mut skipped, mut failures) = (0, 0, 0, Vec::new());
+    let (mut maps, mut doubtful) = (Vec::new(), 0);
     for (number, pair) in pairs.iter().enumerate() {
         let outcome = keys.of(pair).and_then(|key| match made_from(&pair.out) {
             Made::From(old) if old == key => Ok(Outcome::Kept),
             made => {
-                match_pair(pair, &key, args.partial, &mut shapes, console)?;
-                Ok(if matches!(made, Made::Not) { Outcome::New } else { Outcome::Renewed })
+                let result = match_pair(pair, &key, args.partial, &mut shapes, console)?;
+                let anew = !matches!(made, Made::Not);
+                Ok(Outcome::Made { anew, quality: quality(&result.quality, &result.estimate) })
             }
         });
         let place = format!("{} of {}", number + 1, pairs.len());
         match outcome {
             Ok(Outcome::Kept) => skipped += 1,
-            Ok(outcome) => {
+            Ok(Outcome::Made { anew, quality }) => {
                 done += 1;
-                let anew = matches!(outcome, Outcome::Renewed);
                 renewed += usize::from(anew);
+                let is_doubtful = quality["doubtful"] == true;
+                doubtful += usize::from(is_doubtful);
+                let trust = if is_doubtful { ", DOUBTFUL" } else { "" };
+                let error = quality["expected_error"].as_f64().unwrap_or_default();
                 let why = if anew {
                     ", made anew: a mesh, the model or an option is another than before"
                 } else {
                     ""
                 };
-                console.say(&format!("{place}: {}{why}", pair.out.display()));
+                console.say(&format!(
+                    "{place}: {}, expected mean error {error:.1} % of sqrt(area){trust}{why}",
+                    pair.out.display()
+                ));
+                maps.push(json!({ "source": shown(&pair.source), "target": shown(&pair.target),
+                                  "map": shown(&pair.out), "quality": quality }));
             }
             Err(error) => {
                 let error = causes(&error);
@@ -58,9 +68,12 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
         }
     }
     let anew = if renewed > 0 { format!(" ({renewed} of them anew)") } else { String::new() };
-    let text = format!("{done} matched{anew}, {skipped} were there already, {} failed", failures.len());
+    let uncertain = if doubtful > 0 { format!(", {doubtful} of them doubtful") } else { String::new() };
+    let text =
+        format!("{done} matched{anew}{uncertain}, {skipped} were there already, {} failed", failures.len());
     let failed = failures.len();
-    let summary = json!({ "matched": done, "renewed": renewed, "skipped": skipped, "failed": Value::Array(failures),
+    let summary = json!({ "matched": done, "renewed": renewed, "skipped": skipped, "doubtful": doubtful,
+                          "failed": Value::Array(failures), "maps": maps,
                           "out": shown(&args.out) });
     console.result(&text, summary)?;
     if failed > 0 {
@@ -71,8 +84,8 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
 
 enum Outcome {
     Kept,
-    New,
-    Renewed,
+    /// Made now, in place of an older one or for the first time.
+    Made { anew: bool, quality: Value },
 }
 
 /// Refuses a folder whose maps would replace what the command reads.
@@ -87,7 +100,7 @@ fn check_outputs(args: &BatchArgs, pairs: &[Pair]) -> Result<()> {
     inputs.check(&outs)
 }
 
-fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, console: &Console) -> Result<()> {
+fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, console: &Console) -> Result<Match> {
     let target = shapes.get(&pair.target, None, console)?;
     let whole_area = partial.then(|| target.shape.full_mesh.area());
     let source = shapes.get(&pair.source, whole_area, console)?;
@@ -95,7 +108,8 @@ fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, consol
     // Without its key a map is made anew, so it never stands beside the key of another one.
     forget_key(&pair.out)?;
     write_point_map(&pair.out, &result.map)?;
-    write_key(&pair.out, key)
+    write_key(&pair.out, key)?;
+    Ok(result)
 }
 
 /// A shape's file and, where it is a part, the bits of the area of the whole.

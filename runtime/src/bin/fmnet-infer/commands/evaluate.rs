@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use fmnet::Mesh;
 use fmnet::eval::{
     Block, ErrorCurve, ErrorSummary, GroundTruth, GroundTruthSource, HtmlReport, LineChart, Section,
-    curves_csv, geodesic_errors, symmetric_geodesic_errors,
+    curves_csv, geodesic_errors, surface_errors, symmetric_geodesic_errors,
 };
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::io::{MeshFile, read_point_map, write_atomically};
@@ -27,6 +27,8 @@ struct Evaluated {
     map: PointMap,
     curve: ErrorCurve,
     summary: ErrorSummary,
+    /// Of the points on the surface, where the map or the ground truth knows them finer than a vertex.
+    on_surface: Option<ErrorSummary>,
     mirrored: bool,
     /// How many matches are on another component of the target than the right one.
     n_elsewhere: usize,
@@ -113,7 +115,12 @@ impl Pair<'_> {
             .filter(|(x, right)| map.get(*x as usize).is_some_and(|y| !solver.are_connected(y, *right)))
             .count();
         let (curve, summary) = (ErrorCurve::princeton(&errors), ErrorSummary::new(&errors, area));
-        Ok(Evaluated { name, map, curve, summary, mirrored, n_elsewhere })
+        let finer = !mirrored && (map.points.is_some() || truth.points().is_some());
+        let on_surface = match finer {
+            true => Some(ErrorSummary::new(&surface_errors(&map, truth, target, solver)?, area)),
+            false => None,
+        };
+        Ok(Evaluated { name, map, curve, summary, on_surface, mirrored, n_elsewhere })
     }
 }
 
@@ -171,11 +178,15 @@ fn line(result: &Evaluated) -> String {
         n => format!(", {n} on another component"),
     };
     let mirrored = if result.mirrored { " (mirrored)" } else { "" };
-    format!("{}: {}{elsewhere}{mirrored}", result.name, result.summary)
+    let on_surface = result
+        .on_surface
+        .as_ref()
+        .map_or(String::new(), |s| format!("; on the surface mean error x 100: {:.3}", 100.0 * s.mean));
+    format!("{}: {}{on_surface}{elsewhere}{mirrored}", result.name, result.summary)
 }
 
 fn record(result: &Evaluated) -> Value {
-    json!({ "map": result.name, "summary": result.summary, "auc": result.curve.auc(), "mirrored": result.mirrored,
+    json!({ "map": result.name, "summary": result.summary, "on_surface": result.on_surface, "auc": result.curve.auc(), "mirrored": result.mirrored,
             "on_another_component": result.n_elsewhere })
 }
 

@@ -4,7 +4,7 @@ use super::output::{self, Inputs, MapOutput, file_name};
 use crate::args::MatchArgs;
 use crate::console::{Console, shown};
 use anyhow::{Result, bail};
-use fmnet::io::{MeshFile, read_mesh, write_matrix};
+use fmnet::io::{MeshFile, read_landmarks, read_mesh, write_matrix};
 use fmnet::pipeline::{Match, Matcher};
 use fmnet::quality::{Estimate, Quality};
 use serde_json::{Value, json};
@@ -15,9 +15,11 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     let outputs = outputs(args)?;
     let start = Instant::now();
     let observer = |event| console.event(event);
+    let landmarks = args.landmarks.as_deref().map(read_landmarks).transpose()?.unwrap_or_default();
     let matcher = Matcher::new(&args.pipeline.to_options())?;
     let (source, target) = (read(&args.source, console)?, read(&args.target, console)?);
     let mut inputs = Inputs::of_model(&args.pipeline.shape);
+    args.landmarks.iter().for_each(|path| inputs.add(path, "the landmarks"));
     inputs.add_mesh(&args.source, &source);
     inputs.add_mesh(&args.target, &target);
     inputs.check(&outputs)?;
@@ -30,7 +32,9 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
         },
         || matcher.describe(&name_target, &target, &observer),
     );
-    let result = matcher.match_shapes(&described_source?, &described_target?, &observer)?;
+    let (described_source, described_target) = (described_source?, described_target?);
+    let result =
+        matcher.match_with_landmarks(&described_source, &described_target, &landmarks, &observer)?;
     let text = summary_text(&result, start.elapsed().as_secs_f64());
     for path in &args.outputs {
         let (map, caption) = (&result.map, text.as_str());

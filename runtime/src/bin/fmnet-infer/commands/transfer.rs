@@ -26,13 +26,26 @@ pub(crate) fn run(args: &TransferArgs, console: &Console) -> Result<()> {
             source.mesh.n_vertices()
         );
     }
+    let n_faces = target.mesh.n_faces();
+    if let Some(point) = map.points.iter().flatten().flatten().find(|point| point.face as usize >= n_faces) {
+        bail!(
+            "{}: face {} does not exist, {} has {n_faces}; pass the map of these two meshes, in this order",
+            args.map.display(),
+            point.face,
+            args.target.display()
+        );
+    }
     let (giver, receiver, donors) = match args.to {
         Receiver::Source => ((&*args.target, &target), (&*args.source, &source), Donors::of_source(&map)),
         Receiver::Target => {
             ((&*args.source, &source), (&*args.target, &target), Donors::of_target(&map, &target.mesh))
         }
     };
-    let donors = donors.interpolated(&receiver.1.mesh, &giver.1.mesh);
+    let known = args.to == Receiver::Source && map.points.is_some();
+    let donors = match known {
+        true => donors.on_surface(&map, &target.mesh),
+        false => donors.interpolated(&receiver.1.mesh, &giver.1.mesh),
+    };
     let has_mesh = values_of_outputs.iter().any(Option::is_none);
     let attributes =
         if has_mesh { carried(giver, receiver, &donors, console) } else { Attributes::default() };
