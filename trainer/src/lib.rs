@@ -35,6 +35,7 @@
 //! # Ok::<(), fmnet_trainer::train::TrainError>(())
 //! ```
 
+pub mod calibrate;
 pub mod checkpoint;
 pub mod config;
 pub mod dataset;

@@ -313,4 +313,73 @@ mod tests {
         let error = matcher.describe("tiny", &bumpy_sphere(0, 1), &ignore).unwrap_err().to_string();
         assert!(error.starts_with("tiny: 20 eigenpairs"), "{error}");
     }
+
+    /// On a torus nothing tells how far round a point is but landmarks.
+    #[test]
+    fn landmarks_are_kept_and_pull_the_rest() {
+        let source = crate::mesh::shapes::torus(48, 20, 0.4);
+        let (target, new_of_old) = crate::mesh::shapes::permuted(&source, 3);
+        let options = MatchOptions {
+            descriptor: DescriptorKind::Shot,
+            k: Some(30),
+            shot_radius: Some(0.1),
+            solver: Some(FmapSolver::Joint { weight: 0.1 }),
+            refinement: Some(Refinement::Wavelet),
+            effort: Effort::Low,
+            ..MatchOptions::default()
+        };
+        let matcher = Matcher::new(&options).unwrap();
+        let source = matcher.describe("source", &source, &ignore).unwrap();
+        let target = matcher.describe("target", &target, &ignore).unwrap();
+        let right: Vec<(u32, u32)> =
+            [0, 333, 500, 777, 901].map(|v: u32| (v, new_of_old[v as usize])).to_vec();
+        let error = |landmarks: &[(u32, u32)]| {
+            let found = matcher.match_with_landmarks(&source, &target, landmarks, &ignore).unwrap();
+            for &(x, y) in landmarks {
+                assert_eq!((found.map.get(x as usize), found.map.confidence.as_ref().unwrap()[x as usize]), (Some(y), 1.0));
+            }
+            let vertices = target.shape.input_mesh().vertices();
+            let miss = |(x, y): (usize, Option<u32>)| {
+                crate::mesh::vec3::distance(vertices[y.unwrap() as usize], vertices[new_of_old[x] as usize])
+            };
+            found.map.iter().enumerate().map(miss).sum::<f64>() / found.map.len() as f64
+        };
+        let (with, without) = (error(&right), error(&[]));
+        assert!(with < 0.2 && without > 3.0 * with, "{with} with landmarks, {without} without");
+        for (wrong, part) in [((5000, 0), "source vertex 5000"), ((0, 5000), "target vertex 5000")] {
+            let failed = matcher.match_with_landmarks(&source, &target, &[wrong], &ignore);
+            let error = failed.unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("960"), "{error}");
+        }
+    }
+
+    #[test]
+    fn maps_of_a_part_of_the_vertices_come_back_to_all_of_the_input() {
+        // Decimated on both sides, the map goes by the surface.
+        let source = bumpy_sphere(4, 1);
+        let (target, new_of_old) = crate::mesh::shapes::permuted(&source, 8);
+        let options = MatchOptions {
+            descriptor: DescriptorKind::Shot,
+            k: Some(40),
+            shot_radius: Some(0.2),
+            decimate: Some(Some(900)),
+            solver: Some(FmapSolver::Joint { weight: 0.1 }),
+            refinement: Some(Refinement::Wavelet),
+            ..MatchOptions::default()
+        };
+        let found = match_meshes(&source, &target, &options).unwrap();
+        assert_eq!(found.map.len(), source.n_vertices());
+        let points = found.map.points.as_ref().unwrap();
+        let mut worst: f64 = 0.0;
+        let mut sum = 0.0;
+        for (x, y) in found.map.iter().enumerate() {
+            let right = target.vertices()[new_of_old[x] as usize];
+            let at = points[x].unwrap().position(&target);
+            sum += crate::mesh::vec3::distance(at, right);
+            worst = worst.max(crate::mesh::vec3::distance(target.vertices()[y.unwrap() as usize], right));
+        }
+        let mean = sum / source.n_vertices() as f64 / target.scale();
+        assert!(mean < 0.01 && worst < 0.1 * target.scale(), "mean {mean}, worst {worst}");
+        assert!(found.estimate.expected_error < 5.0 && !found.estimate.doubtful && found.candidates.len() == 1);
+    }
 }

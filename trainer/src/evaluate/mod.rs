@@ -9,6 +9,7 @@ pub mod report;
 mod shapes;
 
 use crate::dataset::{Dataset, DatasetError};
+use fmnet::quality::Quality;
 use fmnet::eval::{ErrorCurve, ErrorSummary, EvalError, geodesic_errors, symmetric_geodesic_errors};
 use fmnet::events::{Event, Observer};
 use fmnet::io::{IoError, read_point_map};
@@ -91,6 +92,8 @@ pub struct PairResult {
     pub seconds: f64,
     /// The map, in the vertices of the files.
     pub map: PointMap,
+    /// What the library measures of it without ground truth; none for map files.
+    pub quality: Option<Quality>,
 }
 
 /// How well descriptors tell the right match from the others, over all pairs.
@@ -218,8 +221,8 @@ fn evaluate_method(
         let (source, target) = (&shapes[&s], &shapes[&t]);
         let pair = format!("{} -> {}", source.name, target.name);
         let start = Instant::now();
-        let (map, seconds) = maps.map((s, source), (t, target), observer)?;
-        let compared = compare(map, seconds, source, target, options)
+        let found = maps.map((s, source), (t, target), observer)?;
+        let compared = compare(found, source, target, options)
             .and_then(|result| Ok((result, maps.figures((s, source), (t, target), options)?)));
         let (result, pair_figures) =
             compared.map_err(|source| EvaluateError::Compare { pair: pair.clone(), source })?;
@@ -236,8 +239,7 @@ fn evaluate_method(
 
 /// A map against the ground truth, or the better of it and the mirrored one.
 fn compare(
-    map: PointMap,
-    seconds: f64,
+    FoundMap { map, quality, seconds }: FoundMap,
     source: &LoadedShape,
     target: &LoadedShape,
     options: &EvaluateOptions,
@@ -260,7 +262,14 @@ fn compare(
         mirrored,
         seconds,
         map,
+        quality,
     })
+}
+
+struct FoundMap {
+    map: PointMap,
+    quality: Option<Quality>,
+    seconds: f64,
 }
 
 /// The maps of a method, one after the other; shapes are described once.
@@ -286,10 +295,11 @@ impl Maps {
         (s, source): (usize, &LoadedShape),
         (t, target): (usize, &LoadedShape),
         observer: Observer,
-    ) -> Result<(PointMap, f64), EvaluateError> {
+    ) -> Result<FoundMap, EvaluateError> {
         match self {
             Self::Files(folder) => {
-                Ok((read_map(folder, &source.name, &target.name, target.mesh.n_vertices())?, 0.0))
+                let map = read_map(folder, &source.name, &target.name, target.mesh.n_vertices())?;
+                Ok(FoundMap { map, quality: None, seconds: 0.0 })
             }
             Self::Computed { matcher, described } => {
                 let warnings = |event| {
@@ -311,7 +321,8 @@ impl Maps {
                 let start = Instant::now();
                 let found =
                     matcher.match_shapes(&described[&s], &described[&t], &warnings).map_err(failed)?;
-                Ok((found.map, start.elapsed().as_secs_f64()))
+                let seconds = start.elapsed().as_secs_f64();
+                Ok(FoundMap { map: found.map, quality: Some(found.quality), seconds })
             }
         }
     }

@@ -50,6 +50,8 @@ pub(crate) enum Command {
     Train(Box<TrainArgs>),
     /// Write a checkpoint's network as a model file
     Export(ExportArgs),
+    /// Fit what the measures of a model's maps say of their error, on pairs with ground truth; for `export --calibration`
+    Calibrate(CalibrateArgs),
     /// Match pairs of a dataset with one or several models, compare with the ground truth: tables, plots, a report
     Evaluate(EvaluateArgs),
     /// Run one of the paper's experiments end to end: generate, train, test, report; run again, it goes on where it was
@@ -214,6 +216,30 @@ pub(crate) struct ExportArgs {
     /// Source revision, for the metadata
     #[arg(long, default_value = env!("CARGO_PKG_VERSION"))]
     pub(crate) commit: String,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CalibrateArgs {
+    /// The model file, or `embedded`
+    pub(crate) model: PathBuf,
+    /// Dataset folders, with pairs that the model was not trained on
+    #[arg(required = true)]
+    pub(crate) datasets: Vec<PathBuf>,
+    /// Where the calibration is written
+    #[arg(short, long, value_name = "FILE.json")]
+    pub(crate) output: PathBuf,
+    /// Random pairs of each dataset, matched in five ways each
+    #[arg(long, default_value_t = 20)]
+    pub(crate) pairs: usize,
+    /// Splits that pairs are drawn from, separated by commas
+    #[arg(long, value_delimiter = ',', default_value = "validation")]
+    pub(crate) splits: Vec<Split>,
+    /// Seed of the pairs
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Keep what is computed of each shape in this folder, and use what is there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

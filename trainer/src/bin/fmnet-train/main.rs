@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(&args, &cli.common),
         Command::Preprocess(args) => commands::preprocess::run(&args, &cli.common),
         Command::Train(args) => commands::train::run(*args, &cli.common),
+        Command::Calibrate(args) => commands::calibrate::run(&args, &cli.common),
         Command::Export(args) => commands::export::run(&args, &cli.common),
         Command::Evaluate(args) => commands::evaluate::run(&args, &cli.common),
         Command::Reproduce(args) => commands::reproduce::run(&args, &cli.common),

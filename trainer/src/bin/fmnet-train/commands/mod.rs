@@ -1,5 +1,6 @@
 //! One file for each command.
 
+pub(crate) mod calibrate;
 pub(crate) mod evaluate;
 pub(crate) mod export;
 pub(crate) mod preprocess;
