@@ -5,8 +5,10 @@ use rayon::prelude::*;
 use fmnet::mesh::vec3;
 
 use super::carry::Carriers;
-use super::implicit::{Part, folded, symmetric_field};
+use super::implicit::{Part, field};
 use super::math::{Vec3, perpendicular, unit};
+use super::mirror::Symmetry;
+use super::recipe::Recipe;
 
 /// Newton steps that bring a carried point onto the surface.
 const STEPS: usize = 14;
@@ -15,7 +17,7 @@ const AGREEMENT: f64 = 0.35;
 /// Two landmarks closer than this share of their distance on the base have run into one place.
 const CROWDED: f64 = 0.2;
 
-/// Points of a body's left side, each with its unit normal, and the solids they go with.
+/// Points of a body's modelled side, each with its unit normal, and the solids they go with.
 pub(super) struct Landmarks {
     parts: Vec<Part>,
     pub(super) points: Vec<Vec3>,
@@ -24,11 +26,13 @@ pub(super) struct Landmarks {
     /// Of every landmark the nearest other one, and how far it is.
     nearest: Vec<(u32, f64)>,
     cell: f64,
+    symmetry: Symmetry,
 }
 
 impl Landmarks {
-    /// Landmarks at `points` on the surface of `parts`, polygonised with the spacing `cell`.
-    pub(super) fn new(parts: Vec<Part>, points: Vec<Vec3>, normals: Vec<Vec3>, cell: f64) -> Self {
+    /// Landmarks at `points` on the surface of the base body.
+    pub(super) fn new(base: &Recipe, points: Vec<Vec3>, normals: Vec<Vec3>) -> Self {
+        let (parts, cell, symmetry) = (base.parts.clone(), base.cell, base.symmetry);
         let carriers = points.par_iter().map(|&p| Carriers::of(&parts, p, 1.5 * cell)).collect();
         let distance = |i: usize, j: usize| vec3::distance(points[i], points[j]);
         let others = |i: usize| (0..points.len()).filter(move |&j| j != i);
@@ -37,7 +41,7 @@ impl Landmarks {
             nearest.map_or((i as u32, 0.0), |j| (j as u32, distance(i, j)))
         });
         let nearest = nearest.collect();
-        Self { parts, points, normals, carriers, nearest, cell }
+        Self { parts, points, normals, carriers, nearest, cell, symmetry }
     }
 
     /// Where the landmarks are on the surface of `parts`, whose first ones are those of the base body in other proportions:
@@ -60,7 +64,7 @@ impl Landmarks {
                 let tangent =
                     |along: Vec3| vec3::sub(carry(vec3::add(p, vec3::scale(along, 0.2 * self.cell))), place);
                 let carried = vec3::cross(tangent(vec3::cross(depth, normal)), tangent(depth));
-                settle(parts, place, cell)
+                settle(parts, self.symmetry, place, cell)
                     .filter(|&(_, found)| vec3::dot(unit(carried), found) > AGREEMENT)
                     .map(|(q, _)| q)
             })
@@ -74,11 +78,11 @@ impl Landmarks {
 }
 
 /// The point of the surface that is found straight from `p`, and the unit normal there.
-fn settle(parts: &[Part], mut p: Vec3, cell: f64) -> Option<(Vec3, Vec3)> {
+fn settle(parts: &[Part], symmetry: Symmetry, mut p: Vec3, cell: f64) -> Option<(Vec3, Vec3)> {
     let reach = 8.0 * cell;
     let near: Vec<&Part> =
-        parts.iter().filter(|part| !part.is_beyond(folded(p), 3.0 * reach + part.blend)).collect();
-    let value = |p: Vec3| symmetric_field(near.iter().copied(), p);
+        parts.iter().filter(|part| !part.is_beyond(symmetry.folded(p), 3.0 * reach + part.blend)).collect();
+    let value = |p: Vec3| field(near.iter().copied(), symmetry.folded(p));
     let delta = 0.05 * cell;
     let mut gradient = [0.0; 3];
     for _ in 0..STEPS {

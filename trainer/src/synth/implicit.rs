@@ -110,16 +110,6 @@ pub(super) fn field<'a>(parts: impl Iterator<Item = &'a Part>, p: Vec3) -> f64 {
     value
 }
 
-/// `p` seen on the left side of a symmetric body.
-pub(super) fn folded([x, y, z]: Vec3) -> Vec3 {
-    [x.abs(), y, z]
-}
-
-/// [`field`] of a body that is its own mirror image, to the last bit, whatever the order of its parts.
-pub(super) fn symmetric_field<'a>(parts: impl Iterator<Item = &'a Part>, p: Vec3) -> f64 {
-    field(parts, folded(p))
-}
-
 /// A minimum with its corner rounded by a parabola of width `blend`.
 fn smooth_min(a: f64, b: f64, blend: f64) -> f64 {
     if a == f64::INFINITY {

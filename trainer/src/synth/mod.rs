@@ -9,6 +9,7 @@
 
 mod adjacency;
 mod biped;
+mod bird;
 mod body;
 mod carry;
 mod collision;
@@ -16,9 +17,12 @@ mod correspond;
 mod damage;
 mod dataset;
 mod demo;
+mod fish;
 mod flip;
 mod gait;
+mod hand;
 mod implicit;
+mod insect;
 mod loft;
 mod math;
 mod mirror;

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use fmnet::mesh::vec3;
 
-use super::implicit::{Part, folded, symmetric_field};
+use super::implicit::{Part, field};
 use super::math::Vec3;
-use super::mirror::{mirrored, pair_up};
+use super::mirror::Symmetry;
 
 /// Cells along each side of a block of the grid.
 const BLOCK: usize = 4;
@@ -22,14 +22,16 @@ pub(super) struct Surface {
     pub(super) active: Vec<Vec<u16>>,
     /// For each vertex its list in `active`.
     pub(super) block_of: Vec<u32>,
-    /// Of every vertex the one at its mirror image.
+    /// Of every vertex the one at its image.
     pub(super) twins: Vec<u32>,
+    symmetry: Symmetry,
 }
 
 struct Grid {
     origin: Vec3,
     cell: f64,
     blocks: [usize; 3],
+    symmetry: Symmetry,
 }
 
 #[derive(Default)]
@@ -54,9 +56,9 @@ struct Vertices {
 
 const NONE: u32 = u32::MAX;
 
-/// The zero set of the smooth union of `parts`, which are their own mirror image at x = 0, sampled at the grid spacing `cell`; faces look outwards.
-pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
-    let grid = Grid::around(parts, cell);
+/// The zero set of the smooth union of `parts`, sampled at the grid spacing `cell`; faces look outwards.
+pub(super) fn polygonize(parts: &[Part], cell: f64, symmetry: Symmetry) -> Surface {
+    let grid = Grid::around(parts, cell, symmetry);
     let mut blocks = grid.sample(parts);
     let n_blocks = blocks.len();
     let meshed: Vec<_> = (0..n_blocks).into_par_iter().map(|b| grid.place_vertices(&blocks, b)).collect();
@@ -71,8 +73,8 @@ pub(super) fn polygonize(parts: &[Part], cell: f64) -> Surface {
     let quads: Vec<Vec<[u32; 4]>> =
         (0..n_blocks).into_par_iter().map(|b| grid.quads(&blocks, &first, b)).collect();
     let active = blocks.into_iter().map(|block| block.active).collect();
-    let twins = pair_up(&mut vertices);
-    let mut surface = Surface { vertices, faces: Vec::new(), active, block_of, twins };
+    let twins = symmetry.twins(&mut vertices);
+    let mut surface = Surface { vertices, faces: Vec::new(), active, block_of, twins, symmetry };
     let quads = quads.concat();
     surface.project(parts, cell, 2);
     surface.even_out(&quads);
@@ -90,13 +92,15 @@ fn split([a, b, c, d]: [u32; 4], vertices: &[Vec3]) -> [[u32; 3]; 2] {
 impl Surface {
     /// Value of the body's field near vertex `i`.
     fn value(&self, parts: &[Part], i: usize, p: Vec3) -> f64 {
-        symmetric_field(self.active[self.block_of[i] as usize].iter().map(|&part| &parts[part as usize]), p)
+        let near = self.active[self.block_of[i] as usize].iter().map(|&part| &parts[part as usize]);
+        field(near, self.symmetry.folded(p))
     }
 
-    /// Newton steps onto the zero set, each at most a cell long, on the left side; the right one is its mirror image.
+    /// Newton steps onto the zero set, each at most a cell long, on the modelled side; the other one is its image.
     fn project(&mut self, parts: &[Part], cell: f64, steps: usize) {
-        let left: Vec<usize> = (0..self.vertices.len()).filter(|&i| self.vertices[i][0] > 0.0).collect();
-        let projected = left.par_iter().map(|&i| {
+        let modelled: Vec<usize> =
+            (0..self.vertices.len()).filter(|&i| self.symmetry.holds(self.vertices[i])).collect();
+        let projected = modelled.par_iter().map(|&i| {
             let (mut p, delta) = (self.vertices[i], 0.05 * cell);
             for _ in 0..steps {
                 let value = self.value(parts, i, p);
@@ -111,9 +115,9 @@ impl Surface {
             p
         });
         let projected: Vec<Vec3> = projected.collect();
-        for (i, p) in left.into_iter().zip(projected) {
+        for (i, p) in modelled.into_iter().zip(projected) {
             self.vertices[i] = p;
-            self.vertices[self.twins[i] as usize] = mirrored(p);
+            self.vertices[self.twins[i] as usize] = self.symmetry.image(p);
         }
     }
 
@@ -141,7 +145,7 @@ impl Surface {
 }
 
 impl Grid {
-    fn around(parts: &[Part], cell: f64) -> Self {
+    fn around(parts: &[Part], cell: f64, symmetry: Symmetry) -> Self {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         for part in parts.iter().filter(|part| !part.carve) {
             let (center, radius) = part.solid.bound();
@@ -157,7 +161,7 @@ impl Grid {
         // As many blocks on the left as on the right, so that the grid is its own mirror image.
         let half = ((high[0].max(-low[0]) + 1.5 * cell) / span).ceil();
         (origin[0], blocks[0]) = (-half * span, 2 * half as usize);
-        Self { origin, cell, blocks }
+        Self { origin, cell, blocks, symmetry }
     }
 
     /// Position of the block with index `b` in the grid of blocks.
@@ -231,7 +235,8 @@ impl Grid {
         if active.iter().all(|&part| parts[part as usize].carve) {
             return Block { active, ..Block::default() };
         }
-        let value = symmetric_field(active.iter().map(|&part| &parts[part as usize]), center);
+        let near = active.iter().map(|&part| &parts[part as usize]);
+        let value = field(near, self.symmetry.folded(center));
         let values = if value.abs() < 1.4 * reach { vec![value] } else { vec![] };
         Block { active, inside: value < 0.0, values, ..Block::default() }
     }
@@ -244,9 +249,10 @@ impl Grid {
         let at = |c: usize| {
             let offset = [c % BLOCK, (c / BLOCK) % BLOCK, c / BLOCK.pow(2)];
             let x = place[0] * BLOCK + offset[0];
-            let owner = if x > 0 && 2 * x < width { b - place[0] + (width - x) / BLOCK } else { b };
+            let right = self.symmetry == Symmetry::Mirror && x > 0 && 2 * x < width;
+            let owner = if right { b - place[0] + (width - x) / BLOCK } else { b };
             let near = blocks[owner].active.iter().map(|&part| &parts[part as usize]);
-            symmetric_field(near, self.corner(place, offset))
+            field(near, self.symmetry.folded(self.corner(place, offset)))
         };
         (0..BLOCK.pow(3)).map(at).collect()
     }
@@ -295,7 +301,7 @@ impl Grid {
 
     /// Parts whose distance at `center` is small enough to matter within `reach` of it.
     fn active(&self, parts: &[Part], center: Vec3, reach: f64) -> Vec<u16> {
-        let center = folded(center);
+        let center = self.symmetry.folded(center);
         let matters = |part: &Part| {
             let limit = 1.5 * reach + part.blend + 0.5 * self.cell;
             !part.is_beyond(center, limit + part.blend) && part.solid.distance(center) < limit
@@ -427,7 +433,7 @@ mod tests {
     fn ball_has_the_area_of_a_ball_and_looks_outwards() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let solid = Solid::Ellipsoid { center: [0.0, 0.1, 0.2], radii: [1.0; 3], axes };
-        let ball = polygonize(&[Part::new(solid, 0.1, false, &[0])], 0.05);
+        let ball = polygonize(&[Part::new(solid, 0.1, false, &[0])], 0.05, Symmetry::Mirror);
         let mesh = fmnet::Mesh::new(ball.vertices, ball.faces).unwrap();
         assert_eq!(mesh.n_faces(), 2 * mesh.n_vertices() - 4);
         let volume: f64 =

@@ -6,7 +6,7 @@ macro_rules! proportions {
     ($($(#[$doc:meta])* $field:ident = $default:expr, $spread:expr;)*) => {
         /// Proportions of a species or breed, relative to the typical body's (1, or 0 for what it lacks) unless said otherwise.
         #[derive(Clone, Copy, Debug)]
-        pub(in crate::synth) struct Proportions { $($(#[$doc])* pub(in crate::synth) $field: f64,)* }
+        pub(super) struct Proportions { $($(#[$doc])* pub(super) $field: f64,)* }
 
         impl Default for Proportions {
             fn default() -> Self {
@@ -16,7 +16,7 @@ macro_rules! proportions {
 
         impl Proportions {
             /// Random proportions around these; `width` multiplies all deviations.
-            pub(in crate::synth) fn varied(mut self, rng: &mut impl rand::Rng, width: f64) -> Self {
+            pub(super) fn varied(mut self, rng: &mut impl rand::Rng, width: f64) -> Self {
                 $({
                     let draw = $crate::synth::random::normal(rng, 0.0, width * $spread);
                     self.$field = if $default == 0.0 { (self.$field + draw).max(0.0) } else { self.$field * draw.exp() };
@@ -25,19 +25,30 @@ macro_rules! proportions {
             }
 
             /// Between these and others: `t` = 0 gives these.
-            pub(in crate::synth) fn mixed(&self, other: &Self, t: f64) -> Self {
+            pub(super) fn mixed(&self, other: &Self, t: f64) -> Self {
                 Self { $($field: self.$field + t * (other.$field - self.$field),)* }
             }
         }
     };
 }
 
-/// Defines `SPECIES`, the species of a family: of each its name, and the proportions that are not the default ones.
+/// Defines the species of a family: of each its name, and the proportions that are not the default ones.
 macro_rules! species {
     ($($name:ident { $($field:ident: $value:expr),* $(,)? })*) => {
-        /// The name of each species, and its typical proportions.
-        pub(in crate::synth) const SPECIES: &[(&str, fn() -> Proportions)] =
-            &[$((stringify!($name), || Proportions { $($field: $value,)* ..Proportions::default() }),)*];
+        /// The name of each species.
+        pub(super) const NAMES: &[&str] = &[$(stringify!($name)),*];
+
+        /// The proportions of a breed.
+        pub(super) fn proportions(
+            breed: &$crate::synth::species::Breed,
+            rng: &mut impl rand::Rng,
+        ) -> Proportions {
+            const TYPICAL: &[fn() -> Proportions] =
+                &[$(|| Proportions { $($field: $value,)* ..Proportions::default() }),*];
+            let own = TYPICAL[breed.species]();
+            let mixed = breed.other.map_or(own, |(other, t)| own.mixed(&TYPICAL[other](), t));
+            mixed.varied(rng, if breed.varies { 1.0 } else { 0.0 })
+        }
     };
 }
 

@@ -28,7 +28,7 @@ pub(super) fn generator(species: usize, seed: u64, purpose: Purpose) -> ChaCha8R
 pub(super) fn generator_of_trial(species: usize, seed: u64, purpose: Purpose, trial: u8) -> ChaCha8Rng {
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
-    bytes[8] = species as u8;
+    [bytes[8], bytes[11], ..] = species.to_le_bytes();
     bytes[9] = purpose as u8;
     bytes[10] = trial;
     ChaCha8Rng::from_seed(bytes)

@@ -3,6 +3,7 @@
 use super::implicit::{Part, Solid};
 use super::loft::{Loft, Station};
 use super::math::{Vec3, perpendicular, unit};
+use super::mirror::Symmetry;
 use super::skeleton::Skeleton;
 use fmnet::mesh::vec3;
 
@@ -46,6 +47,7 @@ pub(super) struct Recipe {
     pub(super) bound: Vec<usize>,
     /// How much larger the body is than it was modelled.
     pub(super) scale: f64,
+    pub(super) symmetry: Symmetry,
 }
 
 /// How the next solids are joined; see [`Part`].
@@ -63,7 +65,8 @@ impl Recipe {
     /// Nothing yet; `cell` is the grid spacing of the template.
     pub(super) fn new(cell: f64) -> Self {
         let (skeleton, parts, features) = Default::default();
-        Self { skeleton, parts, features, magnified: Vec::new(), cell, bound: Vec::new(), scale: 1.0 }
+        let (magnified, bound, symmetry) = (Vec::new(), Vec::new(), Symmetry::Mirror);
+        Self { skeleton, parts, features, magnified, cell, bound, scale: 1.0, symmetry }
     }
 
     /// Adds a round spindle from `a` to `b`.

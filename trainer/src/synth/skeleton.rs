@@ -3,6 +3,7 @@
 use fmnet::mesh::vec3;
 
 use super::math::{Quat, Rigid, Vec3, perpendicular, unit};
+use super::mirror::on_side;
 
 /// A bone: it turns about its `head` and carries its children along.
 #[derive(Clone, Debug)]
@@ -34,6 +35,26 @@ impl Skeleton {
     ) -> usize {
         self.bones.push(Bone { name: name.to_owned(), parent, head, tail, softness });
         self.bones.len() - 1
+    }
+
+    /// Appends bones: of each its name, parent, head, tail and softness.
+    pub(super) fn add_all(&mut self, bones: &[(&str, Option<usize>, Vec3, Vec3, f64)]) {
+        for &(name, parent, head, tail, softness) in bones {
+            self.add(name, parent, head, tail, softness);
+        }
+    }
+
+    /// Appends the given bones of the left side, then their mirror images: `NAME_left`, `NAME_right`. A parent is a bone that
+    /// is already there, or one of the same side.
+    pub(super) fn add_pairs(&mut self, bones: &[(&str, usize, Vec3, Vec3, f64)]) {
+        let first = self.len();
+        for (side, side_name) in ["left", "right"].into_iter().enumerate() {
+            for &(name, parent, head, tail, softness) in bones {
+                let parent = if parent < first { parent } else { parent + side * bones.len() };
+                let name = format!("{name}_{side_name}");
+                self.add(&name, Some(parent), on_side(head, side), on_side(tail, side), softness);
+            }
+        }
     }
 
     pub(super) fn len(&self) -> usize {

@@ -10,7 +10,7 @@ use super::UNMATCHED;
 use super::adjacency::{Adjacency, components};
 use super::correspond::Landmarks;
 use super::math::Vec3;
-use super::mirror::{mirrored, opposite_bones};
+use super::mirror::{Symmetry, opposite_bones};
 use super::polygonize::polygonize;
 use super::random::permutation;
 use super::recipe::Recipe;
@@ -22,22 +22,24 @@ use rand::Rng;
 /// Landmarks aimed at, on both sides together.
 const LANDMARKS: f64 = 3000.0;
 
-/// A closed surface that is its own mirror image, fine detail enlarged.
+/// A closed surface, fine detail enlarged.
 pub(super) struct Surface {
     pub(super) points: Vec<Vec3>,
     pub(super) faces: Vec<[u32; 3]>,
-    /// Of every vertex the one at its mirror image.
+    /// Of every vertex the one at its image.
     pub(super) twins: Vec<u32>,
+    symmetry: Symmetry,
     pub(super) influences: Vec<Influences>,
 }
 
 impl Surface {
     pub(super) fn of(recipe: &Recipe) -> Self {
-        let surface = polygonize(&recipe.parts, recipe.cell);
+        let symmetry = recipe.symmetry;
+        let surface = polygonize(&recipe.parts, recipe.cell, symmetry);
         let (points, faces, twins) = (surface.vertices, surface.faces, surface.twins);
         let bone = |i: usize| {
             // Blocks on the right name the parts of the left, which the body there is the image of.
-            let p = [points[i][0].abs(), points[i][1], points[i][2]];
+            let p = symmetry.folded(points[i]);
             let active = &surface.active[surface.block_of[i] as usize];
             let solids = active.iter().map(|&part| &recipe.parts[part as usize]).filter(|part| !part.carve);
             let nearest = solids.min_by(|a, b| a.solid.distance(p).total_cmp(&b.solid.distance(p)));
@@ -45,17 +47,18 @@ impl Surface {
         };
         let bones: Vec<usize> = (0..points.len()).into_par_iter().map(bone).collect();
         let opposite = opposite_bones(&recipe.skeleton);
-        let of_side =
-            |(i, bone): (usize, usize)| (if points[i][0] < 0.0 { opposite[bone] } else { bone }) as u8;
+        let of_side = |(i, bone): (usize, usize)| {
+            (if symmetry.folded(points[i]) != points[i] { opposite[bone] } else { bone }) as u8
+        };
         let bone_of: Vec<u8> = bones.into_iter().enumerate().map(of_side).collect();
         let mut influences =
             diffused_weights(&recipe.skeleton, &bone_of, &Adjacency::new(points.len(), &faces));
-        for i in (0..points.len()).filter(|&i| points[i][0] > 0.0) {
+        for i in (0..points.len()).filter(|&i| symmetry.holds(points[i])) {
             let mut image = influences[i];
             image.bones.iter_mut().for_each(|bone| *bone = opposite[*bone as usize] as u8);
             influences[twins[i] as usize] = image;
         }
-        Self { points, faces, twins, influences }
+        Self { points, faces, twins, symmetry, influences }
     }
 
     /// Whether it is one closed piece without handles.
@@ -64,14 +67,14 @@ impl Surface {
         self.points.len() == self.faces.len() / 2 + 2 && pieces.iter().all(|&piece| piece == 0)
     }
 
-    /// Moves a vertex to each place of the left side, and its twin to the mirror image: the two vertices of each place, or
+    /// Moves a vertex to each place of the modelled side, and its twin to the image: the vertices of each place, or
     /// [`UNMATCHED`].
     pub(super) fn snap_to(&mut self, places: &[Option<Vec3>]) -> Vec<u32> {
         let known: Vec<Vec3> = places.iter().flatten().copied().collect();
         let nearest = nearest_k_vertices(&self.points, &known, 8);
         let mut taken = HashSet::new();
         let mut candidates = nearest.chunks(8).zip(&known).map(|(near, &place)| {
-            let free = |&&i: &&u32| self.points[i as usize][0] > 0.0 && taken.insert(i);
+            let free = |&&i: &&u32| self.symmetry.holds(self.points[i as usize]) && taken.insert(i);
             let chosen = near.iter().find(free).copied();
             (chosen.unwrap_or(UNMATCHED), place)
         });
@@ -83,18 +86,18 @@ impl Surface {
         let mut landmarks = Vec::with_capacity(2 * places.len());
         for found in chosen {
             let Some((i, place)) = found else {
-                landmarks.extend([UNMATCHED; 2]);
+                landmarks.extend(self.symmetry.both(UNMATCHED, UNMATCHED));
                 continue;
             };
             let twin = self.twins[i as usize];
             self.points[i as usize] = place;
-            self.points[twin as usize] = mirrored(place);
-            landmarks.extend([i, twin]);
+            self.points[twin as usize] = self.symmetry.image(place);
+            landmarks.extend(self.symmetry.both(i, twin));
         }
         landmarks
     }
 
-    /// Landmarks spread evenly over the typical body: random vertices of the left side, none nearer to another or to its mirror
+    /// Landmarks spread evenly over the typical body: random vertices of the modelled side, none nearer to another or to its
     /// image than a fixed distance, or half of it where the two look in opposite directions (as on both sides of a finger).
     pub(super) fn landmarks(&self, recipe: &Recipe, rng: &mut impl Rng) -> Landmarks {
         let typical = BodyShape::typical(recipe);
@@ -111,7 +114,8 @@ impl Surface {
         let mut chosen = Vec::new();
         for i in permutation(rng, rest.len()) {
             let (p, normal) = (rest[i as usize], rest_normals[i as usize]);
-            if p[0] <= 0.0 || 2.0 * p[0] < 0.5 * radius {
+            let image = self.symmetry.image(p);
+            if !self.symmetry.holds(p) || (image != p && vec3::distance(p, image) < 0.5 * radius) {
                 continue;
             }
             let [x, y, z] = cell_of(p);
@@ -121,7 +125,8 @@ impl Surface {
             };
             let around = (0..27).map(|c| [x + c % 3 - 1, y + (c / 3) % 3 - 1, z + c / 9 - 1]);
             if !around.into_iter().any(|cell| grid.get(&cell).is_some_and(|list| list.iter().any(clash))) {
-                for (p, normal) in [(p, normal), (mirrored(p), mirrored(normal))] {
+                let other = (image, self.symmetry.image(normal));
+                for (p, normal) in self.symmetry.both((p, normal), other) {
                     grid.entry(cell_of(p)).or_default().push((p, normal));
                 }
                 chosen.push(i as usize);
@@ -130,6 +135,6 @@ impl Surface {
         let normals = vertex_normals(&self.points, &self.faces);
         let points = chosen.iter().map(|&i| self.points[i]).collect();
         let normals = chosen.iter().map(|&i| normals[i]).collect();
-        Landmarks::new(recipe.parts.clone(), points, normals, recipe.cell)
+        Landmarks::new(recipe, points, normals)
     }
 }

@@ -6,14 +6,12 @@ use rand::Rng;
 
 use super::collision::Proxies;
 use super::math::{Quat, Vec3};
-use super::mirror::mirrored;
 use super::random::{Purpose, generator, uniform};
 use super::recipe::Recipe;
 use super::shape::{BodyShape, reach_of};
 use super::skinning::{Influences, pose_skin, scale_bones, scaled_joints};
-use super::species::{Family, Species};
+use super::species::Species;
 use super::surface::Surface;
-use super::{gait, pose};
 
 /// Proportions tried before a body that is no sphere is taken as it is.
 const BREED_TRIALS: u8 = 12;
@@ -48,11 +46,11 @@ impl Template {
         let (recipe, mut surface) = sound_body(species, breed);
         let places = species.family().landmarks().on(&recipe.parts, recipe.scale);
         let landmarks = surface.snap_to(&places);
-        let Surface { points, faces, twins, influences } = surface;
+        let Surface { points, faces, twins, influences, .. } = surface;
         let mut normals = vertex_normals(&points, &faces);
         for (i, &twin) in twins.iter().enumerate() {
-            if points[i][0] > 0.0 {
-                normals[twin as usize] = mirrored(normals[i]);
+            if recipe.symmetry.holds(points[i]) {
+                normals[twin as usize] = recipe.symmetry.image(normals[i]);
             }
         }
         let typical = BodyShape::typical(&recipe);
@@ -118,14 +116,13 @@ impl Template {
     /// A rest pose, or a random one in which the body hardly penetrates itself.
     fn pose(&self, seed: u64, stance: Stance, shape: &BodyShape) -> Vec<Quat> {
         let mut rng = generator(self.species.index(), seed, Purpose::Pose);
-        let skeleton = &self.recipe.skeleton;
+        let (plan, skeleton) = (self.species.family().plan(), &self.recipe.skeleton);
         let mut best = (f64::INFINITY, Vec::new());
         for _ in 0..POSE_TRIALS {
-            let rotations = match (self.species.family(), stance) {
-                (Family::Biped, Stance::Posed) => pose::random_biped(skeleton, &mut rng),
-                (Family::Biped, _) => pose::resting_biped(skeleton, &mut rng),
-                (Family::Quadruped, Stance::Posed) => gait::random_quadruped(&mut rng),
-                (Family::Quadruped, _) => gait::resting_quadruped(&mut rng),
+            let rotations = if stance == Stance::Posed {
+                (plan.pose)(skeleton, &mut rng)
+            } else {
+                (plan.rest)(skeleton, &mut rng)
             };
             let strain = self.recipe.bound.iter().map(|&bone| (rotations[bone].angle() - FREE).max(0.0));
             let fault = self.proxies.penetration(skeleton, shape, &rotations) + 2.0 * strain.sum::<f64>();

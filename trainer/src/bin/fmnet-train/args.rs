@@ -68,7 +68,8 @@ pub(crate) struct SynthArgs {
     /// Individuals of each species, 2 and up
     #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) count: u32,
-    /// Species, separated by commas, and families (biped, quadruped) for all of theirs [default: all]
+    /// Species, separated by commas, and families (biped, quadruped, hand, bird, fish,
+    /// insect) for all of theirs [default: all]
     #[arg(long, value_delimiter = ',')]
     pub(crate) species: Vec<String>,
     /// Share of the individuals of each species that are for validation, 0 to 0.9

@@ -1,15 +1,16 @@
 //! Arms and legs of a biped.
 
 use super::super::math::{Vec3, lerp, unit};
+use super::super::mirror::on_side;
 use super::super::recipe::{Girth, Join};
-use super::{ARM, BACK_OF_HAND, FOOT_MAGNIFIED, HAND_MAGNIFIED, Sculptor, bone, mirror};
+use super::{ARM, BACK_OF_HAND, FOOT_MAGNIFIED, HAND_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 impl Sculptor {
     pub(super) fn arm(&mut self, side: usize) {
         use bone::*;
         let (girth, muscle, long) = (self.to.arm_girth, self.to.muscle, self.to.arm_length);
-        let on = |p: Vec3| mirror(p, side);
+        let on = |p: Vec3| on_side(p, side);
         let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
         let upper = Join { bones: &[limb(UPPER_ARM, side)], blend: 0.035 };
         let lower = Join { bones: &[limb(FOREARM, side)], blend: 0.03 };
@@ -57,7 +58,7 @@ impl Sculptor {
     pub(super) fn hand(&mut self, side: usize) {
         use bone::*;
         let size = HAND_MAGNIFIED * self.to.hand;
-        let on = |p: Vec3| mirror(p, side);
+        let on = |p: Vec3| on_side(p, side);
         let at = |along: f64, across: f64, up: f64| on(self.palm(along, across, up));
         let back = on(BACK_OF_HAND);
         let palm_join = Join { bones: &[limb(HAND, side)], blend: 0.016 * size };
@@ -98,7 +99,7 @@ impl Sculptor {
     pub(super) fn leg(&mut self, side: usize) {
         use bone::*;
         let (girth, muscle, long) = (self.to.leg_girth, self.to.muscle, self.to.leg_length);
-        let on = |p: Vec3| mirror(p, side);
+        let on = |p: Vec3| on_side(p, side);
         let (hip, knee, ankle) = (self.hip(), self.knee(), self.ankle());
         let thigh = Join { bones: &[limb(THIGH, side)], blend: 0.04 };
         let shin = Join { bones: &[limb(SHIN, side)], blend: 0.035 };
@@ -137,7 +138,7 @@ impl Sculptor {
     pub(super) fn foot(&mut self, side: usize) {
         use bone::*;
         let size = FOOT_MAGNIFIED * self.to.foot;
-        let at = |x: f64, y: f64, z: f64| mirror(self.sole([x, y, z]), side);
+        let at = |x: f64, y: f64, z: f64| on_side(self.sole([x, y, z]), side);
         let foot = Join { bones: &[limb(FOOT, side)], blend: 0.022 * size };
         let (ankle, heel) = (at(0.0, 0.0, 0.0), at(0.0, -0.052, -0.042));
         let (instep, ball) = (at(-0.004, -0.03, 0.05), at(-0.002, -0.062, 0.125));

@@ -2,6 +2,8 @@
 //!
 //! Lengths are those of an adult 1.75 tall; a species scales regions of it.
 
+use outfit::Outfit;
+
 mod head;
 mod limbs;
 mod outfit;
@@ -9,12 +11,12 @@ mod species;
 mod trunk;
 
 use super::math::Vec3;
+use super::pose;
 use super::proportions::proportions;
+use super::random::chance;
 use super::recipe::Recipe;
+use super::species::Plan;
 use fmnet::mesh::vec3;
-
-pub(super) use outfit::Outfit;
-pub(super) use species::SPECIES;
 
 /// Indices of the bones of a biped. Those of a limb are offsets to be passed to [`limb`].
 pub(in crate::synth) mod bone {
@@ -90,6 +92,24 @@ proportions! {
     tail_girth = 1.0, 0.15;
 }
 
+/// Bipeds: people, apes, stylised figures.
+pub(super) static PLAN: Plan = Plan {
+    name: "biped",
+    species: species::NAMES,
+    held_out: Some("slender"),
+    base: || recipe(&Proportions::default(), &Outfit::default()),
+    breed: |breed, rng| {
+        let proportions = species::proportions(breed, rng);
+        let dressed = breed.varies && chance(rng, DRESSED);
+        let outfit = if dressed { Outfit::random(rng) } else { Outfit::default() };
+        recipe(&proportions, &outfit)
+    },
+    pose: |skeleton, rng| pose::random_biped(skeleton, rng),
+    rest: |skeleton, rng| pose::resting_biped(skeleton, rng),
+};
+
+/// Share of the breeds that wear something.
+const DRESSED: f64 = 0.18;
 const HEAD_MAGNIFIED: f64 = 1.3;
 const HAND_MAGNIFIED: f64 = 1.65;
 const FOOT_MAGNIFIED: f64 = 1.2;
@@ -99,7 +119,7 @@ const ARM: Vec3 = [0.766, -0.643, 0.0];
 const BACK_OF_HAND: Vec3 = [0.643, 0.766, 0.0];
 
 /// The body of a biped with the given proportions, and what it wears. Bodies of all proportions have the same first parts.
-pub(super) fn recipe(proportions: &Proportions, outfit: &Outfit) -> Recipe {
+fn recipe(proportions: &Proportions, outfit: &Outfit) -> Recipe {
     let mut sculptor = Sculptor { recipe: Recipe::new(0.0092), to: *proportions };
     sculptor.bones();
     sculptor.trunk();
@@ -121,10 +141,6 @@ struct Sculptor {
     to: Proportions,
 }
 
-fn mirror(p: Vec3, side: usize) -> Vec3 {
-    if side == 0 { p } else { [-p[0], p[1], p[2]] }
-}
-
 impl Sculptor {
     fn bones(&mut self) {
         use bone::*;
@@ -141,36 +157,22 @@ impl Sculptor {
             FOOT | TOES => FOOT_MAGNIFIED,
             _ => 1.0,
         };
-        for (name, parent, head, tail, softness) in skeleton {
-            self.recipe.skeleton.add(name, parent, head, tail, softness);
-        }
-        for side in 0..2 {
-            let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
-            let (knee, ankle) = (self.knee(), self.ankle());
-            let limbs = [
-                ("clavicle", CHEST, self.torso([0.03, 1.43, 0.0]), shoulder, 0.8),
-                ("upper_arm", CLAVICLE, shoulder, elbow, 0.55),
-                ("forearm", UPPER_ARM, elbow, wrist, 0.22),
-                ("hand", FOREARM, wrist, self.palm(0.095, 0.0, 0.0), 0.3),
-                ("fingers", HAND, self.palm(0.095, 0.0, 0.0), self.palm(0.18, 0.0, 0.0), 0.06),
-                ("thumb", HAND, self.palm(0.03, 0.026, 0.0), self.palm(0.085, 0.07, -0.01), 0.06),
-                ("thigh", PELVIS, self.hip(), knee, 0.9),
-                ("shin", THIGH, knee, ankle, 0.4),
-                ("foot", SHIN, ankle, self.sole([0.0, -0.06, 0.125]), 0.2),
-                ("toes", FOOT, self.sole([0.0, -0.06, 0.125]), self.sole([0.0, -0.06, 0.19]), 0.15),
-            ];
-            for (name, parent, head, tail, softness) in limbs {
-                let name = format!("{name}_{}", ["left", "right"][side]);
-                let parent = if parent < CLAVICLE { parent } else { limb(parent, side) };
-                self.recipe.skeleton.add(
-                    &name,
-                    Some(parent),
-                    mirror(head, side),
-                    mirror(tail, side),
-                    softness,
-                );
-            }
-        }
+        self.recipe.skeleton.add_all(&skeleton);
+        let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
+        let (knee, ankle) = (self.knee(), self.ankle());
+        let limbs = [
+            ("clavicle", CHEST, self.torso([0.03, 1.43, 0.0]), shoulder, 0.8),
+            ("upper_arm", CLAVICLE, shoulder, elbow, 0.55),
+            ("forearm", UPPER_ARM, elbow, wrist, 0.22),
+            ("hand", FOREARM, wrist, self.palm(0.095, 0.0, 0.0), 0.3),
+            ("fingers", HAND, self.palm(0.095, 0.0, 0.0), self.palm(0.18, 0.0, 0.0), 0.06),
+            ("thumb", HAND, self.palm(0.03, 0.026, 0.0), self.palm(0.085, 0.07, -0.01), 0.06),
+            ("thigh", PELVIS, self.hip(), knee, 0.9),
+            ("shin", THIGH, knee, ankle, 0.4),
+            ("foot", SHIN, ankle, self.sole([0.0, -0.06, 0.125]), 0.2),
+            ("toes", FOOT, self.sole([0.0, -0.06, 0.125]), self.sole([0.0, -0.06, 0.19]), 0.15),
+        ];
+        self.recipe.skeleton.add_pairs(&limbs);
         for (name, parent, from) in [("tail_1", PELVIS, 0.0), ("tail_2", TAIL, 0.5)] {
             let (head, tail) = (self.tail_axis(from), self.tail_axis(from + 0.5));
             self.recipe.skeleton.add(name, Some(parent), head, tail, 0.3);

@@ -4,9 +4,10 @@ use rand::Rng;
 
 use super::super::loft::{Loft, Station};
 use super::super::math::{Vec3, lerp};
+use super::super::mirror::on_side;
 use super::super::random::{chance, uniform};
 use super::super::recipe::{Girth, Join};
-use super::{FOOT_MAGNIFIED, HEAD_MAGNIFIED, Sculptor, bone, mirror};
+use super::{FOOT_MAGNIFIED, HEAD_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 /// Roundness of the ends of garments, relative to their girth.
@@ -14,7 +15,7 @@ const HEM: f64 = 0.12;
 
 /// What a biped wears.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::synth) struct Outfit {
+pub(super) struct Outfit {
     /// Volume of the hair, and how far it falls, both in metres.
     hair: Option<[f64; 2]>,
     /// Width of the brim, relative to the head.
@@ -31,7 +32,7 @@ pub(in crate::synth) struct Outfit {
 
 impl Outfit {
     /// A random outfit; some are only hair or shoes.
-    pub(in crate::synth) fn random(rng: &mut impl Rng) -> Self {
+    pub(super) fn random(rng: &mut impl Rng) -> Self {
         let dressed = chance(rng, 0.75);
         let skirted = dressed && chance(rng, 0.3);
         let mut draw = |probability: f64, ranges: &[[f64; 2]]| -> Option<Vec<f64>> {
@@ -124,7 +125,7 @@ impl Sculptor {
         ];
         self.garment(&[PELVIS, LUMBAR, CHEST], &sections, loose);
         for side in 0..2 {
-            let on = |p: Vec3| mirror(p, side);
+            let on = |p: Vec3| on_side(p, side);
             let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
             let (upper, lower) = (sleeve.min(1.0), (sleeve - 1.0).max(0.0));
             let radius = |t: f64| (0.056 - 0.014 * t) * to.arm_girth + loose;
@@ -171,7 +172,7 @@ impl Sculptor {
         ];
         self.garment(&[PELVIS], &sections, loose);
         for side in 0..2 {
-            let on = |p: Vec3| mirror(p, side);
+            let on = |p: Vec3| on_side(p, side);
             let (hip, knee, ankle) = (self.hip(), self.knee(), self.ankle());
             let join = |name: usize| [limb(name, side)];
             let thigh = (2.0 * length).min(1.0);
@@ -190,7 +191,7 @@ impl Sculptor {
     fn shoe(&mut self, [thick, shaft]: [f64; 2], side: usize) {
         use bone::*;
         let size = FOOT_MAGNIFIED * self.to.foot;
-        let at = |x: f64, y: f64, z: f64| mirror(self.sole([x, y, z]), side);
+        let at = |x: f64, y: f64, z: f64| on_side(self.sole([x, y, z]), side);
         let (ankle, shin) = (at(0.0, -0.01, -0.006), [limb(SHIN, side), limb(FOOT, side)]);
         let (heel, ball, toe) = (at(0.0, -0.05, -0.036), at(0.0, -0.058, 0.1), at(0.002, -0.064, 0.16));
         let up = [0.0, 1.0, 0.0];
@@ -199,7 +200,7 @@ impl Sculptor {
         let girth = |a: f64, b: f64| Girth((a + thick) * size, (b + thick) * size, 0.0);
         self.recipe.flat_spindle(join, heel, ball, girth(0.038, 0.05), up, 0.8);
         self.recipe.flat_spindle(Join { bones: &toes, ..join }, ball, toe, girth(0.05, 0.04), up, 0.6);
-        let top = mirror(lerp(self.ankle(), self.knee(), shaft), side);
+        let top = on_side(lerp(self.ankle(), self.knee(), shaft), side);
         let wide = (0.036 + 0.014 * shaft) * self.to.leg_girth + thick;
         self.recipe.spindle(Join { bones: &shin, ..join }, ankle, top, Girth(0.042 * size, wide, 0.0));
     }

@@ -2,8 +2,9 @@
 
 use super::super::loft::Station;
 use super::super::math::{Vec3, lerp};
+use super::super::mirror::on_side;
 use super::super::recipe::{FeatureKind, Girth, Join};
-use super::{HEAD_MAGNIFIED, Sculptor, bone, mirror};
+use super::{HEAD_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 impl Sculptor {
@@ -69,7 +70,7 @@ impl Sculptor {
     fn trunk_side(&mut self, side: usize) {
         use bone::*;
         let to = self.to;
-        let on = |p: Vec3| mirror(p, side);
+        let on = |p: Vec3| on_side(p, side);
         let chest = Join { bones: &[CHEST], blend: 0.04 };
         let pectoral = on(self.torso([0.075, 1.315, 0.062 * to.chest]));
         self.recipe.tilted_ellipsoid(chest, pectoral, [0.08, 0.058, 0.038 * to.muscle], on([0.3, 1.0, 0.15]));
@@ -112,7 +113,7 @@ impl Sculptor {
             (Face, self.skull([0.0, 0.12, -0.09]), 0.08, [0.0, 0.0, -1.0]),
         ];
         for side in 0..2 {
-            let on = |p: Vec3| mirror(p, side);
+            let on = |p: Vec3| on_side(p, side);
             let along = |a: Vec3, b: Vec3, t: f64, out: Vec3| on(vec3::add(lerp(a, b, t), out));
             let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
             let (hip, knee, ankle) = (self.hip(), self.knee(), self.ankle());
@@ -127,7 +128,7 @@ impl Sculptor {
                 (Muscle, along(elbow, wrist, 0.25, [0.0, 0.03, 0.02]), 0.06, on([0.5, 0.7, 0.4])),
                 (Muscle, along(hip, knee, 0.5, [0.02, 0.0, 0.07]), 0.12, on([0.3, 0.0, 1.0])),
                 (Muscle, along(knee, ankle, 0.3, [0.0, 0.0, -0.06]), 0.08, [0.0, 0.0, -1.0]),
-                (Face, mirror(self.skull([0.05, 0.04, 0.07]), side), 0.035, on([1.0, 0.0, 0.6])),
+                (Face, on_side(self.skull([0.05, 0.04, 0.07]), side), 0.035, on([1.0, 0.0, 0.6])),
             ]);
         }
         for (kind, center, radius, direction) in places {

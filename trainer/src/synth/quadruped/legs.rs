@@ -1,16 +1,17 @@
 //! The legs of a quadruped.
 
 use super::super::math::{Vec3, lerp};
+use super::super::mirror::on_side;
 use super::super::recipe::{Girth, Join};
-use super::{PAW_MAGNIFIED, Sculptor, bone, mirror};
+use super::{PAW_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 impl Sculptor {
     pub(super) fn front_leg(&mut self, side: usize) {
         use bone::*;
         let girth = self.to.leg_girth;
-        let [shoulder, elbow, wrist, ball] = self.front().map(|p| mirror(p, side));
-        let blade = mirror(self.at([0.055, 0.54, 0.19]), side);
+        let [shoulder, elbow, wrist, ball] = self.front().map(|p| on_side(p, side));
+        let blade = on_side(self.at([0.055, 0.54, 0.19]), side);
         let mut rod = |name: usize, blend: f64, a: Vec3, b: Vec3, radii: [f64; 3]| {
             let [ra, rb, bulge] = radii.map(|r| r * girth);
             self.recipe.spindle(Join { bones: &[limb(name, side)], blend }, a, b, Girth(ra, rb, bulge));
@@ -28,7 +29,7 @@ impl Sculptor {
     pub(super) fn hind_leg(&mut self, side: usize) {
         use bone::*;
         let girth = self.to.leg_girth;
-        let [hip, knee, hock, ball] = self.hind().map(|p| mirror(p, side));
+        let [hip, knee, hock, ball] = self.hind().map(|p| on_side(p, side));
         let mut rod = |name: usize, blend: f64, a: Vec3, b: Vec3, radii: [f64; 3]| {
             let [ra, rb, bulge] = radii.map(|r| r * girth);
             self.recipe.spindle(Join { bones: &[limb(name, side)], blend }, a, b, Girth(ra, rb, bulge));
@@ -74,7 +75,7 @@ impl Sculptor {
         }
         let size = PAW_MAGNIFIED * self.to.paw;
         for (name, [.., ball]) in [(bone::FORE_TOES, self.front()), (bone::HIND_TOES, self.hind())] {
-            let at = |y: f64, z: f64| mirror(vec3::add(ball, vec3::scale([0.0, y, z], size)), side);
+            let at = |y: f64, z: f64| on_side(vec3::add(ball, vec3::scale([0.0, y, z], size)), side);
             let join = Join { bones: &[bone::limb(name, side)], blend: 0.014 * size };
             let (top, sole) = (at(0.02, 0.004), at(-0.016, 0.016));
             self.recipe.spindle(join, top, sole, Girth(0.018 * size, 0.026 * size, 0.0));

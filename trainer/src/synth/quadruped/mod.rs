@@ -7,12 +7,12 @@ mod legs;
 mod species;
 mod trunk;
 
+use super::gait;
 use super::math::Vec3;
 use super::proportions::proportions;
 use super::recipe::Recipe;
+use super::species::Plan;
 use fmnet::mesh::vec3;
-
-pub(super) use species::SPECIES;
 
 /// Indices of the bones of a quadruped. Those of a limb are offsets to be passed to [`limb`].
 pub(in crate::synth) mod bone {
@@ -91,13 +91,24 @@ proportions! {
     mane = 0.0, 0.0;
 }
 
+/// Animals on four legs.
+pub(super) static PLAN: Plan = Plan {
+    name: "quadruped",
+    species: species::NAMES,
+    held_out: Some("panther"),
+    base: || recipe(&Proportions::default()),
+    breed: |breed, rng| recipe(&species::proportions(breed, rng)),
+    pose: |_, rng| gait::random_quadruped(rng),
+    rest: |_, rng| gait::resting_quadruped(rng),
+};
+
 const HEAD_MAGNIFIED: f64 = 1.25;
 const PAW_MAGNIFIED: f64 = 1.25;
 /// Height of the elbow region, below which legs are stretched.
 const LEG: f64 = 0.36;
 
 /// The body of a quadruped with the given proportions. Bodies of all proportions have the same first parts.
-pub(super) fn recipe(proportions: &Proportions) -> Recipe {
+fn recipe(proportions: &Proportions) -> Recipe {
     let mut sculptor = Sculptor { recipe: Recipe::new(0.0068), to: *proportions };
     sculptor.bones();
     sculptor.trunk();
@@ -118,10 +129,6 @@ struct Sculptor {
     to: Proportions,
 }
 
-fn mirror(p: Vec3, side: usize) -> Vec3 {
-    if side == 0 { p } else { [-p[0], p[1], p[2]] }
-}
-
 impl Sculptor {
     fn bones(&mut self) {
         use bone::*;
@@ -137,32 +144,23 @@ impl Sculptor {
             ("tail_2", Some(TAIL), self.tail(0.33), self.tail(0.66), 0.3),
             ("tail_3", Some(TAIL + 1), self.tail(0.66), self.tail(1.0), 0.3),
         ];
-        for (name, parent, head, tail, softness) in spine {
-            self.recipe.skeleton.add(name, parent, head, tail, softness);
-        }
-        for side in 0..2 {
-            let on = |p: Vec3| mirror(p, side);
-            let [shoulder, elbow, wrist, pad] = self.front().map(on);
-            let [hip, knee, hock, ball] = self.hind().map(on);
-            let blade = on(self.at([0.05, 0.56, 0.19]));
-            let (claws, nails) = (on(self.paw(self.front()[3], 0.05)), on(self.paw(self.hind()[3], 0.05)));
-            let limbs = [
-                ("blade", CHEST, blade, shoulder, 0.8),
-                ("upper_arm", BLADE, shoulder, elbow, 0.6),
-                ("forearm", UPPER_ARM, elbow, wrist, 0.35),
-                ("hand", FOREARM, wrist, pad, 0.15),
-                ("fore_toes", HAND, pad, claws, 0.12),
-                ("thigh", PELVIS, hip, knee, 0.8),
-                ("shin", THIGH, knee, hock, 0.4),
-                ("foot", SHIN, hock, ball, 0.15),
-                ("hind_toes", FOOT, ball, nails, 0.12),
-            ];
-            for (name, parent, head, tail, softness) in limbs {
-                let name = format!("{name}_{}", ["left", "right"][side]);
-                let parent = if parent < BLADE { parent } else { limb(parent, side) };
-                self.recipe.skeleton.add(&name, Some(parent), head, tail, softness);
-            }
-        }
+        self.recipe.skeleton.add_all(&spine);
+        let [shoulder, elbow, wrist, pad] = self.front();
+        let [hip, knee, hock, ball] = self.hind();
+        let blade = self.at([0.05, 0.56, 0.19]);
+        let (claws, nails) = (self.paw(pad, 0.05), self.paw(ball, 0.05));
+        let limbs = [
+            ("blade", CHEST, blade, shoulder, 0.8),
+            ("upper_arm", BLADE, shoulder, elbow, 0.6),
+            ("forearm", UPPER_ARM, elbow, wrist, 0.35),
+            ("hand", FOREARM, wrist, pad, 0.15),
+            ("fore_toes", HAND, pad, claws, 0.12),
+            ("thigh", PELVIS, hip, knee, 0.8),
+            ("shin", THIGH, knee, hock, 0.4),
+            ("foot", SHIN, hock, ball, 0.15),
+            ("hind_toes", FOOT, ball, nails, 0.12),
+        ];
+        self.recipe.skeleton.add_pairs(&limbs);
         for (name, parent, from) in [("proboscis_1", HEAD, 0.0), ("proboscis_2", PROBOSCIS, 0.5)] {
             let (head, tail) = (self.proboscis(from), self.proboscis(from + 0.5));
             self.recipe.skeleton.add(name, Some(parent), head, tail, 0.5);

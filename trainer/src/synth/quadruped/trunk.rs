@@ -2,8 +2,9 @@
 
 use super::super::loft::Station;
 use super::super::math::{Vec3, lerp, unit};
+use super::super::mirror::on_side;
 use super::super::recipe::{FeatureKind, Girth, Join};
-use super::{HEAD_MAGNIFIED, Sculptor, bone, mirror};
+use super::{HEAD_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 impl Sculptor {
@@ -77,7 +78,7 @@ impl Sculptor {
             (Face, self.skull([0.0, 0.0, 0.11]), 0.04, [0.0, 1.0, 0.3]),
         ];
         for side in 0..2 {
-            let on = |p: Vec3| mirror(p, side);
+            let on = |p: Vec3| on_side(p, side);
             let [shoulder, elbow, wrist, _] = self.front();
             let [hip, knee, hock, _] = self.hind();
             let out = on([1.0, 0.0, 0.0]);
@@ -90,7 +91,7 @@ impl Sculptor {
                 (Muscle, along(shoulder, elbow, 0.2, [0.04, 0.0, 0.02]), 0.07, on(unit([1.0, 0.0, 0.5]))),
                 (Muscle, along(elbow, wrist, 0.3, [0.0, 0.0, 0.03]), 0.05, [0.0, 0.0, 1.0]),
                 (Muscle, along(knee, hock, 0.3, [0.0, 0.0, -0.03]), 0.05, [0.0, 0.0, -1.0]),
-                (Face, mirror(self.skull([0.06, -0.01, 0.05]), side), 0.04, out),
+                (Face, on_side(self.skull([0.06, -0.01, 0.05]), side), 0.04, out),
             ]);
         }
         for (kind, center, radius, direction) in places {

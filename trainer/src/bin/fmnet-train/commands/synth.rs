@@ -55,8 +55,9 @@ fn chosen(names: &[String]) -> Result<Vec<Species>> {
     let known =
         |name: &str| Family::ALL.iter().any(|f| f.name() == name) || all.iter().any(|s| s.name() == name);
     if let Some(name) = names.iter().find(|name| !known(name)) {
-        let list: Vec<&str> = all.iter().map(|species| species.name()).collect();
-        bail!("--species: there is no {name}; there are biped, quadruped, {}", list.join(", "));
+        let mut list: Vec<&str> = Family::ALL.iter().map(|family| family.name()).collect();
+        list.extend(all.iter().map(|species| species.name()));
+        bail!("--species: there is no {name}; there are {}", list.join(", "));
     }
     let wanted =
         |s: &Species| names.iter().any(|name| [s.name(), s.family().name()].contains(&name.as_str()));
