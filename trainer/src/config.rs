@@ -337,7 +337,7 @@ impl TrainConfig {
 
     /// How shapes are processed.
     pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), whole_area: None }
+        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), ..ShapeOptions::default() }
     }
 
     /// How SHOT is computed.

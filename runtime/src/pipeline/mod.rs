@@ -40,6 +40,8 @@ pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement,
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
 const SHOT_K: usize = 120;
+/// Meshes of fewer vertices than this are subdivided.
+const SPARSE: usize = 2000;
 /// The model that is built into the library.
 const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
 
@@ -123,6 +125,7 @@ impl Matcher {
         Ok(Self {
             shape_options: ShapeOptions {
                 decimate: options.decimate.unwrap_or(default_decimate),
+                subdivide: options.subdivide.unwrap_or(Some(SPARSE)),
                 whole_area: None,
             },
             k,

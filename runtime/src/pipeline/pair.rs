@@ -295,7 +295,8 @@ impl Pair<'_> {
         let decimated = source.is_decimated() || target.is_decimated();
         match (&found.embedding, self.matcher.upscaling) {
             (Some(embedding), upscaling) if !decimated || upscaling == Upscaling::Surface => {
-                let map = self.timed("surface points", || on_inputs(source, target, &found.map, embedding, doubt));
+                let map =
+                    self.timed("surface points", || on_inputs(source, target, &found.map, embedding, doubt));
                 Ok((map, None))
             }
             (_, upscaling) => full_by_functional_map(self, &found.map, upscaling, doubt),

@@ -61,7 +61,9 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
 
 /// A map that `--strict` does not let pass.
 #[derive(Debug, thiserror::Error)]
-#[error("the map is doubtful, expected mean error {expected_error:.1} % of sqrt(area) (--strict); it was written")]
+#[error(
+    "the map is doubtful, expected mean error {expected_error:.1} % of sqrt(area) (--strict); it was written"
+)]
 pub(crate) struct Doubtful {
     expected_error: f64,
 }
