@@ -26,7 +26,7 @@ fn every_place_of_a_path_takes_any_name() {
     let (work, _) = workplace();
     let at = |name: &OsStr| work.folder().join(name);
     if std::fs::copy(work.path("a.off"), at(&latin1("off"))).is_err() {
-        eprintln!("skipped: this disk takes no names but Unicode");
+        fmnet_tests::skipped("this disk takes no names but Unicode");
         return;
     }
     std::fs::copy(work.path("id.txt"), at(&latin1("txt"))).unwrap();

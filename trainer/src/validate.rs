@@ -84,6 +84,7 @@ impl Validation {
                 is_target.then(|| GeodesicSolver::new(processed.shape.mesh(), &GeodesicOptions::default()));
             shapes.push(HeldOut { processed, input, basis, solver });
         }
+        check_groups(shapes.iter().map(|shape| (&shape.processed.entry, shape.processed.points.len())))?;
         let pairs = drawn.iter().map(|(s, t)| (position[s], position[t])).collect();
         Ok(Self { shapes, pairs })
     }

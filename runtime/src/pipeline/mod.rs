@@ -12,6 +12,7 @@
 
 mod adapt;
 mod candidates;
+mod describe_pair;
 mod descriptor;
 mod finish;
 mod landmarks;
@@ -34,6 +35,7 @@ use pair::Pair;
 use std::path::Path;
 
 pub use candidates::Candidate;
+pub use describe_pair::Named;
 pub use descriptor::{Descriptor, NetworkDescriptor};
 pub use landmarks::LandmarkError;
 pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
@@ -121,11 +123,14 @@ impl Matcher {
         let default_decimate = metadata.map_or(ShapeOptions::default().decimate, |m| m.decimate);
         let solver = metadata.map_or(FmapSolver::LeastSquares, |m| m.solver.for_matching());
         let k = options.k.unwrap_or_else(|| metadata.map_or(SHOT_K, |m| m.k));
+        // Subdivided meshes would not be triangulated alike, nor would a bijection of theirs be one of the inputs' vertices.
+        let one_to_one =
+            matches!(options.refinement, Some(Refinement::Pmf | Refinement::SharedTriangulation));
         let by_default = if network.is_some() { None } else { Some(Refinement::None) };
         Ok(Self {
             shape_options: ShapeOptions {
                 decimate: options.decimate.unwrap_or(default_decimate),
-                subdivide: options.subdivide.unwrap_or(Some(SPARSE)),
+                subdivide: options.subdivide.unwrap_or((!one_to_one).then_some(SPARSE)),
                 whole_area: None,
             },
             k,
@@ -209,7 +214,7 @@ impl Matcher {
     /// as a part.
     ///
     /// # Errors
-    /// As [`Matcher::describe`], and if `whole_area` is out of range.
+    /// As [`Matcher::describe`], and if `whole_area` is out of range or the refinement is for whole shapes only.
     pub fn describe_part(
         &self,
         name: &str,
@@ -217,6 +222,9 @@ impl Matcher {
         whole_area: f64,
         observer: Observer,
     ) -> Result<DescribedShape, Error> {
+        if self.refinement(true) == Refinement::Icp {
+            return Err(Error::IcpOfPart.in_shape(name));
+        }
         let options = ShapeOptions { whole_area: Some(whole_area), ..self.shape_options.clone() };
         self.describe_by(&options, name, mesh, observer)
     }
@@ -250,7 +258,7 @@ impl Matcher {
     /// described as one.
     ///
     /// # Errors
-    /// If the descriptors are of different models or not finite, a shape has too few eigenfunctions, a stage would take more
+    /// If the target is a part, the descriptors are of different models or not finite, a shape has too few eigenfunctions, a stage would take more
     /// memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the shape or the pair.
     pub fn match_shapes(
         &self,
@@ -286,8 +294,7 @@ impl Matcher {
 pub fn match_meshes(source: &Mesh, target: &Mesh, options: &MatchOptions) -> Result<Match, Error> {
     let matcher = Matcher::new(options)?;
     let observer: Observer = &crate::events::ignore;
-    let source = matcher.describe("source", source, observer)?;
-    let target = matcher.describe("target", target, observer)?;
+    let [source, target] = matcher.describe_pair(("source", source), ("target", target), false, observer)?;
     matcher.match_shapes(&source, &target, observer)
 }
 

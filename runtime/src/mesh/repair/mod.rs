@@ -2,7 +2,8 @@
 
 mod cut;
 mod faces;
-pub(super) use faces::{repeated_faces, weld};
+pub(crate) use faces::repeated_faces;
+pub(super) use faces::weld;
 mod near;
 pub(crate) use near::weld_near;
 mod orient;
