@@ -1,7 +1,7 @@
 //! The order of the stages at deployment: two meshes in, a dense map out.
 //!
 //! ```text
-//! each shape:  repair -> decimate                                          (Shape::new)
+//! each shape:  repair -> subdivide or decimate                             (Shape::new)
 //!              -> quantities that the descriptor asks for -> descriptor    (Matcher::describe)
 //! a pair:      functional maps -> point maps -> refine -> judge            (Matcher::match_shapes)
 //!              -> other candidates, where the map is doubtful
@@ -237,6 +237,15 @@ impl Matcher {
         observer: Observer,
     ) -> Result<DescribedShape, Error> {
         let context = self.context(observer);
+        if let Some(network) = &self.network
+            && network.network.metadata().shot.radius != network.shot.radius
+        {
+            observer(Event::Warning(format!(
+                "{name}: the SHOT radius is {}, but the model was trained with {}; leave it as it is for a better map",
+                network.shot.radius,
+                network.network.metadata().shot.radius
+            )));
+        }
         let shape = Shape::new(name, mesh, options, context)?;
         let wanted = self.refinement(options.whole_area.is_some()).eigenpairs(self.k);
         // Small meshes do not have so many eigenfunctions as refinement would like.
@@ -244,7 +253,7 @@ impl Matcher {
         let described_k = self.descriptor().eigenpairs();
         if described_k > shape.max_eigenpairs() {
             observer(Event::Warning(format!(
-                "{name}: {} vertices are few, of which the model sees less than of finer meshes; subdivide the mesh for a better map",
+                "{name}: {} vertices are few, of which the model sees less than of finer meshes; subdivide the mesh for a better map (--subdivide N)",
                 shape.n()
             )));
         }
@@ -258,8 +267,9 @@ impl Matcher {
     /// described as one.
     ///
     /// # Errors
-    /// If the target is a part, the descriptors are of different models or not finite, a shape has too few eigenfunctions, a stage would take more
-    /// memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the shape or the pair.
+    /// If the target is a part, the descriptors are of different models or not finite, a shape has too few eigenfunctions, a
+    /// stage would take more memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the
+    /// shape or the pair.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
@@ -306,7 +316,7 @@ mod tests {
 
     fn matcher(k: usize) -> Matcher {
         let (descriptor, k) = (DescriptorKind::Shot, Some(k));
-        Matcher::new(&MatchOptions { descriptor, k, ..MatchOptions::default() }).unwrap()
+        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() }).unwrap()
     }
 
     #[test]
