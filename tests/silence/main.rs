@@ -5,6 +5,7 @@ mod attributes;
 mod meshes;
 mod outputs;
 mod paths;
+mod trainer;
 
 use fmnet::Mesh;
 use fmnet::mesh::shapes::bumpy_sphere;

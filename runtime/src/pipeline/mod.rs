@@ -316,7 +316,8 @@ mod tests {
 
     fn matcher(k: usize) -> Matcher {
         let (descriptor, k) = (DescriptorKind::Shot, Some(k));
-        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() }).unwrap()
+        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() })
+            .unwrap()
     }
 
     #[test]
