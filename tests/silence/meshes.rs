@@ -91,7 +91,10 @@ fn meshes_of_games_match() {
     let found = error(&sparse.mesh, &targets(&work.path("m.txt")), &back);
     assert!(found < 5.0, "{found} % of the diagonal");
     // The features of a subdivided mesh name the file's vertices.
-    run(&work, &["features", "a.ply", "--out", "f", "--descriptor", "shot", "-k", "20"]);
+    run(
+        &work,
+        &["features", "a.ply", "--out", "f", "--descriptor", "shot", "-k", "20", "--subdivide", "2000"],
+    );
     let vertices = fmnet::io::read_vector::<i32>(&work.path("f/vertices.npy")).unwrap();
     assert_eq!(vertices.len(), 2000);
     assert!(vertices.iter().all(|&v| (v as usize) < sparse.mesh.n_vertices()));

@@ -1,7 +1,7 @@
 //! The network tried on held-out pairs, through the runtime's own functional map and point map, without refinement.
 
 use crate::config::TrainConfig;
-use crate::dataset::{MISSING, ShapeEntry};
+use crate::dataset::{MISSING, ShapeEntry, check_groups};
 use crate::events::{TrainEvent, TrainObserver};
 use crate::network::{Network, NetworkInput, NetworkOptions};
 use crate::precompute::{PrepareError, ProcessedShape, ShapeArrays, process};

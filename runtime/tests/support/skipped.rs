@@ -1,5 +1,7 @@
 //! What a test does where something that it needs is not at hand.
 
+#![allow(unreachable_pub, reason = "one of the crates that share this file exports it")]
+
 use std::fmt::Display;
 
 /// Says what was left out and why; with `FMNET_REQUIRE_ALL=1` the test fails instead.
