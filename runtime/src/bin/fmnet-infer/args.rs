@@ -72,8 +72,8 @@ pub(crate) struct ShapeArgs {
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
     #[arg(long, value_name = "N|off", value_parser = vertices)]
     pub(crate) decimate: Option<Vertices>,
-    /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices [default: 2000; off for
-    /// features and for the refinements pmf and shared-triangulation]
+    /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices [default:
+    /// 2000; off for features and for the refinements pmf and shared-triangulation]
     #[arg(long, value_name = "N|off", value_parser = vertices)]
     pub(crate) subdivide: Option<Vertices>,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
