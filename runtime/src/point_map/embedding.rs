@@ -158,8 +158,7 @@ mod tests {
         let source = rectangle(30, 40, 25);
         let order = shuffle(1200);
         let target = reordered(&source, &order);
-        let embedding =
-            BothMaps::with_adjoint(identity(25)).embedding(Comparison::Joint, &source, &target).unwrap();
+        let embedding = BothMaps::with_adjoint(identity(25)).embedding(Comparison::Joint, &source, &target).unwrap();
         let (forth, back) = (embedding.forth().unwrap(), embedding.back().unwrap());
         assert_eq!(back.targets, order);
         assert_eq!(embedding.matches().unwrap(), [forth.targets.clone(), order.clone()]);
