@@ -66,6 +66,22 @@ fn the_number_of_threads_does_not_change_a_byte() {
     }
 }
 
+/// The network, its inputs and the joint map too; three threads cut the work otherwise than one or two do.
+#[test]
+fn the_learned_path_is_the_same_on_any_number_of_threads() {
+    let work = Workplace::new();
+    work.mesh("a.off", &bumpy_sphere(4, 1));
+    work.mesh("b.off", &bumpy_sphere(4, 2));
+    let files = |threads: &str| {
+        work.succeed(&["match", "a.off", "b.off", "-o", "m.csv", "--threads", threads]);
+        work.succeed(&["features", "a.off", "--out", "f", "--threads", threads]);
+        ["m.csv", "f/descriptors.npy", "f/gradients_x.npy"]
+            .map(|name| std::fs::read(work.path(name)).unwrap())
+    };
+    let one = files("1");
+    assert!(one == files("2") && one == files("3"), "threads change the result");
+}
+
 /// Only `shared-triangulation` follows what both meshes share, and says so where they share nothing.
 #[test]
 fn refinements_do_what_their_names_say() {

@@ -8,7 +8,7 @@ use fmnet::diffusion_net::{Architecture, Operators, forward};
 use fmnet::io::read_mesh;
 use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet::pipeline::{MatchOptions, Matcher, ModelSource};
-use fmnet_tests::{relative_difference, research_data, test_metadata};
+use fmnet_tests::{relative_difference, research_data, skipped, test_metadata};
 use fmnet_trainer::export::export;
 use fmnet_trainer::network::{
     DiffusionNetwork, DiffusionOptions, Network, NetworkInput, set_parameter_values,
@@ -24,7 +24,7 @@ type Archive = NpzArchive<BufReader<File>>;
 fn folder() -> Option<PathBuf> {
     let folder = research_data()?.join("../reference/diffusion_net");
     if !folder.is_dir() {
-        eprintln!("skipped: {} is absent", folder.display());
+        skipped(format!("{} is absent", folder.display()));
         return None;
     }
     Some(folder)

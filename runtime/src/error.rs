@@ -64,6 +64,12 @@ pub enum Error {
         /// The area given.
         area: f64,
     },
+    /// The target of a pair was described as a part of a shape.
+    #[error("a part can only be the source of a map, and its whole the target; exchange the two")]
+    PartAsTarget,
+    /// Spectral ICP of a part: its maps preserve areas, and those of a part to its whole do not.
+    #[error("spectral ICP is for whole shapes only; refine the map of a part with --refine zoomout")]
+    IcpOfPart,
     /// Any of these, on a known shape or pair.
     #[error("{shape}: {source}")]
     InShape {
@@ -83,6 +89,15 @@ impl Error {
         }
     }
 
+    /// Whether a stage would have taken more memory than there was.
+    pub fn is_lack_of_memory(&self) -> bool {
+        match self {
+            Self::InShape { source, .. } => source.is_lack_of_memory(),
+            Self::Memory(_) => true,
+            _ => false,
+        }
+    }
+
     /// Whether the program or the machine failed (a file that cannot be written, too little memory, a solver that did
     /// not converge), rather than the input or the options being wrong.
     pub fn is_own_failure(&self) -> bool {
@@ -93,5 +108,31 @@ impl Error {
             | Self::Memory(_) => true,
             _ => false,
         }
+    }
+}
+
+/// An error with its causes, each once: the text of many holds that of their cause.
+pub fn causes(error: &(dyn std::error::Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let further = std::iter::successors(error.source(), |&cause| cause.source());
+    for cause in further.map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let source = std::io::Error::other("no such file");
+        let error =
+            Err::<(), _>(IoError::Read { path: "a.off".into(), source }).context("--target").unwrap_err();
+        assert_eq!(causes(error.as_ref()), "--target: cannot read a.off: no such file");
     }
 }

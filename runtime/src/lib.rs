@@ -89,9 +89,12 @@ pub mod quality;
 pub mod refine;
 pub mod render;
 pub mod shape;
+#[cfg(test)]
+#[path = "../tests/support/skipped.rs"]
+mod skip;
 pub mod spectral;
 pub mod upscale;
 
-pub use error::Error;
+pub use error::{Error, causes};
 pub use matrix::Matrix;
 pub use mesh::Mesh;

@@ -11,12 +11,16 @@ use fmnet::{Matrix, Mesh};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
+#[path = "support/skipped.rs"]
+mod skip;
+use skip::skipped;
+
 /// The development data, if it is there.
 fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("FMNET_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
     if !folder.is_dir() {
-        eprintln!("skipped: there is no {} (set FMNET_DATA)", folder.display());
+        skipped(format!("there is no {} (set FMNET_DATA)", folder.display()));
         return None;
     }
     Some(folder)

@@ -52,7 +52,8 @@ fn mapped() -> impl Strategy<Value = (Mesh, Mesh, PointMap)> {
 
 /// The source's, the target's, and each with places within triangles; with the giver and the receiver.
 fn all_donors<'a>(source: &'a Mesh, target: &'a Mesh, map: &PointMap) -> Vec<(&'a Mesh, &'a Mesh, Donors)> {
-    let (to_source, to_target) = (Donors::of_source(map), Donors::of_target(map, target));
+    let (to_source, to_target) =
+        (Donors::of_source(map), Donors::of_target(map, target).expect("the map is of the target"));
     vec![
         (target, source, to_source.clone().interpolated(source, target)),
         (target, source, to_source),

@@ -184,3 +184,25 @@ fn agrees_with_the_authors_implementation() {
         assert_eq!(info.zero_rows, 0, "{name}");
     }
 }
+
+/// Vertices whose descriptors are kept in `data/shot_bumpy_sphere.npy`: what the present code gives, which agrees with the authors'
+/// implementation where their data is at hand. With `FMNET_WRITE_GOLDEN=1` the test writes the file.
+const GOLDEN: [usize; 6] = [0, 1, 40, 200, 333, 641];
+
+#[test]
+fn values_of_a_small_mesh_are_the_ones_they_were() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/shot_bumpy_sphere.npy");
+    let options = ShotOptions { radius: 0.3, ..ShotOptions::default() };
+    let (all, info) = shot(&shapes::bumpy_sphere(3, 1), &options).unwrap();
+    assert_eq!(info.zero_rows, 0);
+    let found = Matrix::from_fn(GOLDEN.len(), all.cols(), |i, j| all[(GOLDEN[i], j)]);
+    if std::env::var_os("FMNET_WRITE_GOLDEN").is_some_and(|value| value == "1") {
+        fmnet::io::write_matrix(&path, &found).unwrap();
+    }
+    let golden = fmnet::io::read_matrix::<f32>(&path).unwrap();
+    assert_eq!((golden.rows(), golden.cols()), (found.rows(), found.cols()));
+    // Sums of another order on another processor differ in the last digits.
+    for (at, (a, b)) in found.data().iter().zip(golden.data()).enumerate() {
+        assert!((a - b).abs() < 1e-5, "row {}, column {}: {a} instead of {b}", at / 352, at % 352);
+    }
+}

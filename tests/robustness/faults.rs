@@ -2,11 +2,12 @@
 
 use fmnet::io::read_mesh;
 use fmnet::mesh::shapes::{bumpy_sphere, grid};
-use fmnet_tests::{SHOT, Workplace, files_below, infer, targets};
+use fmnet_tests::{SHOT, Workplace, files_below, infer, skipped, targets};
+use std::io::{BufRead, BufReader};
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 fn pair(work: &Workplace, subdivisions: u32) {
     work.mesh("a.off", &bumpy_sphere(subdivisions, 1));
@@ -35,7 +36,7 @@ fn assert_failed(output: &Output, code: i32, parts: &[&str]) {
 #[test]
 fn a_full_device_is_named() {
     if !Path::new("/dev/full").exists() {
-        eprintln!("skipped: no /dev/full here");
+        skipped("no /dev/full here");
         return;
     }
     let work = Workplace::new();
@@ -78,7 +79,7 @@ fn a_read_only_folder_is_named() {
     std::fs::create_dir(&folder).unwrap();
     std::fs::set_permissions(&folder, std::fs::Permissions::from_mode(0o555)).unwrap();
     if std::fs::write(folder.join("probe"), "").is_ok() {
-        eprintln!("skipped: this user (root?) may write to read-only folders");
+        skipped("this user (root?) may write to read-only folders");
         return;
     }
     assert_failed(&work.run(&matching(&["locked/m.txt"])), 1, &["locked/m.txt", "ermission denied"]);
@@ -92,7 +93,7 @@ fn a_read_only_folder_is_named() {
 /// `/proc` refuses every new file, whoever asks.
 #[test]
 fn a_folder_that_takes_no_files_is_named() {
-    let Ok(true) = Path::new("/proc/self").try_exists() else { return };
+    let Ok(true) = Path::new("/proc/self").try_exists() else { return skipped("no /proc here") };
     let work = Workplace::new();
     pair(&work, 3);
     assert_failed(&work.run(&matching(&["/proc/m.txt"])), 1, &["/proc/m.txt"]);
@@ -108,17 +109,21 @@ fn start(work: &Workplace, arguments: &[&str]) -> Child {
     command.spawn().unwrap()
 }
 
-fn wait_for(what: impl Fn() -> bool) {
-    let start = Instant::now();
-    while !what() {
-        assert!(start.elapsed() < Duration::from_secs(120), "nothing happened in two minutes");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-fn interrupt(child: &Child) {
+/// Interrupts a program once it has said something, which is after it began to listen to interrupts. Its exit status must be that of
+/// an interrupted one.
+fn interrupt_after(mut child: Child, said: &str) {
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let heard = lines.find(|line| line.contains(said));
+    assert!(heard.is_some(), "it ended without saying {said:?}");
     let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(status.success());
+    let rest: Vec<String> = lines.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
+}
+
+/// A file that whoever reads it waits for without end: what comes before it is done, and nothing after.
+fn endless(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
 }
 
 #[test]
@@ -130,21 +135,20 @@ fn an_interrupted_batch_leaves_whole_files_and_goes_on() {
     }
     let ordered = names.iter().flat_map(|s| names.iter().filter(move |t| *t != s).map(move |t| (s, t)));
     let pairs: String = ordered.map(|(s, t)| format!("{s} {t}\n")).collect();
+    let pairs = format!("{pairs}s0.off last.off\n");
     std::fs::write(work.path("pairs.txt"), &pairs).unwrap();
+    endless(&work.path("last.off"));
     let arguments = [&["batch", "pairs.txt", "--out", "maps"][..], &SHOT].concat();
     // Once while shapes are written to the cache, once while maps are.
-    for wanted in ["maps/cache", "maps/s0__s1.txt"] {
-        let child = start(&work, &arguments);
-        wait_for(|| work.path(wanted).exists());
-        std::thread::sleep(Duration::from_millis(30));
-        interrupt(&child);
-        let output = child.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+    for said in ["s1.off: repair", " of 31: maps/"] {
+        interrupt_after(start(&work, &arguments), said);
         assert!(work.temporary_files().is_empty(), "{:?}", work.temporary_files());
         for file in files_below(&work.path("maps")).iter().filter(|f| f.extension().unwrap() == "txt") {
             assert_eq!(targets(file).len(), 2562, "{}", file.display());
         }
     }
+    std::fs::remove_file(work.path("last.off")).unwrap();
+    work.mesh("last.off", &bumpy_sphere(4, 9));
     work.succeed(&arguments);
     // Beside each map its key, and the cache.
     assert_eq!(std::fs::read_dir(work.path("maps")).unwrap().count(), 2 * pairs.lines().count() + 1);
@@ -155,11 +159,8 @@ fn an_interrupted_match_leaves_nothing() {
     let work = Workplace::new();
     work.mesh("a.off", &grid(200, 200));
     work.mesh("b.off", &grid(201, 199));
-    let child = start(&work, &[&matching(&["m.txt"])[..], &["--decimate", "off"]].concat());
-    std::thread::sleep(Duration::from_millis(300));
-    interrupt(&child);
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+    let arguments = [&matching(&["m.txt"])[..], &["--decimate", "off", "--cache", "cache"]].concat();
+    interrupt_after(start(&work, &arguments), ".off: repair");
     assert!(!work.path("m.txt").exists() && work.temporary_files().is_empty());
 }
 

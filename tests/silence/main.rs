@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 mod attributes;
+mod meshes;
 mod outputs;
 mod paths;
+mod trainer;
 
 use fmnet::Mesh;
 use fmnet::mesh::shapes::bumpy_sphere;

@@ -1,5 +1,7 @@
 //! What several tests need: the Python and JavaScript environments, the real data, small models, a place to run the programs in.
 
+#[path = "../../runtime/tests/support/skipped.rs"]
+mod skip;
 mod workplace;
 
 use fmnet::network::contract::{FORMAT_VERSION, ModelMetadata};
@@ -8,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+pub use skip::skipped;
 pub use workplace::{SHOT, Workplace, files_below, infer, scratch, targets, train};
 
 /// The workspace.
@@ -21,7 +24,7 @@ pub fn research_data() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    eprintln!("skipped: no research data at {}; set FMNET_DATA to its folder", folder.display());
+    skipped(format!("no research data at {}; set FMNET_DATA to its folder", folder.display()));
     None
 }
 
@@ -56,7 +59,7 @@ fn prepared(name: &str, prepare: &dyn Fn(&Path) -> Result<PathBuf, String>) -> O
     match prepare(&folder) {
         Ok(path) => Some(path),
         Err(reason) => {
-            eprintln!("skipped what needs {name}: {reason}");
+            skipped(format!("what needs {name}: {reason}"));
             None
         }
     }

@@ -273,6 +273,10 @@ impl TrainConfig {
         let at_least_0 = |value: f64| value >= 0.0 && value.is_finite();
         let above_0 = |value: f64| value > 0.0 && value.is_finite();
         range("dataset", !self.dataset.0.is_empty(), &"empty", "one folder at least")?;
+        for (name, path) in [("out", &self.out), ("cache", &self.cache)] {
+            let expected = "a name in Unicode, as config.toml in the run's folder names it";
+            range(name, path.to_str().is_some(), &path.display(), expected)?;
+        }
         range("steps", self.steps > 0, &self.steps, "1 or more")?;
         range("pairs", self.pairs > 0, &self.pairs, "1 or more")?;
         range("pool", self.pool >= 100, &self.pool, "100 or more")?;
@@ -337,7 +341,7 @@ impl TrainConfig {
 
     /// How shapes are processed.
     pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), whole_area: None }
+        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), ..ShapeOptions::default() }
     }
 
     /// How SHOT is computed.

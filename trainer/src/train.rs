@@ -5,7 +5,7 @@
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
-use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split};
+use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split, check_groups};
 use crate::events::{TrainEvent, TrainObserver};
 use crate::network::{Network, NetworkOptions};
 use crate::plot::History;
@@ -215,7 +215,9 @@ fn prepare_entries(
             Ok(shape)
         })
         .collect();
-    Ok(prepared?)
+    let prepared = prepared?;
+    check_groups(prepared.iter().map(|shape| (&shape.entry, shape.points.len())))?;
+    Ok(prepared)
 }
 
 /// What is prepared of each shape for a run.

@@ -1,7 +1,7 @@
 //! The network tried on held-out pairs, through the runtime's own functional map and point map, without refinement.
 
 use crate::config::TrainConfig;
-use crate::dataset::{MISSING, ShapeEntry};
+use crate::dataset::{MISSING, ShapeEntry, check_groups};
 use crate::events::{TrainEvent, TrainObserver};
 use crate::network::{Network, NetworkInput, NetworkOptions};
 use crate::precompute::{PrepareError, ProcessedShape, ShapeArrays, process};
@@ -84,6 +84,7 @@ impl Validation {
                 is_target.then(|| GeodesicSolver::new(processed.shape.mesh(), &GeodesicOptions::default()));
             shapes.push(HeldOut { processed, input, basis, solver });
         }
+        check_groups(shapes.iter().map(|shape| (&shape.processed.entry, shape.processed.points.len())))?;
         let pairs = drawn.iter().map(|(s, t)| (position[s], position[t])).collect();
         Ok(Self { shapes, pairs })
     }

@@ -15,9 +15,9 @@ fn check(mesh_file: &str, reference: &str) {
     let data = data_folder();
     let reference = data.join("../reference").join(format!("{reference}_spectrum_geodesics.npz"));
     if !data.join(mesh_file).exists() || !reference.exists() {
-        eprintln!(
-            "skipped: {mesh_file} or its reference is not at hand; set FMNET_DATA to the data's folder"
-        );
+        crate::skip::skipped(format!(
+            "{mesh_file} or its reference is not at hand; set FMNET_DATA to the data's folder"
+        ));
         return;
     }
     let mesh = read_mesh(&data.join(mesh_file)).unwrap().mesh;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::graph::LocalGraph;
 use super::search::Search;
 use super::surface::Surface;
-use crate::mesh::{MeshError, Topology, UnionFind, vec3, weld};
+use crate::mesh::{MeshError, Topology, UnionFind, vec3, weld_near};
 use crate::{Matrix, Mesh};
 
 /// How finely a [`GeodesicSolver`] works.
@@ -34,7 +34,7 @@ impl Default for GeodesicOptions {
 /// is then the shortest chain of such lines. It is an upper bound of the exact distance ([`exact`](super::exact()))
 /// and equal to it as long as the shortest path has no straight part longer than the neighbourhood.
 ///
-/// Boundary vertices at one place are one vertex, so meshes whose triangles share no vertices are surfaces all the same. Where
+/// Boundary vertices at one place, or 1e-5 of the diagonal apart, are one vertex, so meshes whose triangles share no vertices are surfaces all the same. Where
 /// a closed surface touches itself, nothing is joined.
 ///
 /// Lengths are in the mesh's unit. Vertices on another component are infinitely far. A boundary is an obstacle that
@@ -226,7 +226,7 @@ impl GeodesicSolver {
 
 /// For every vertex the first one at its place, where both are on a boundary; else itself.
 fn weld_boundaries(mesh: &Mesh) -> Vec<u32> {
-    let places = weld(mesh);
+    let places = weld_near(mesh);
     let mut welded: Vec<u32> = (0..mesh.n_vertices() as u32).collect();
     if places == welded {
         return welded;

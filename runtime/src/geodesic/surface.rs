@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::mesh::{Mesh, vec3};
+use crate::mesh::{Mesh, repeated_faces, vec3};
 
 /// How the faces around a vertex hang together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +96,11 @@ impl Surface {
 
     pub(super) fn n_vertices(&self) -> usize {
         self.fans.len()
+    }
+
+    /// Number of sides, three a face.
+    pub(super) fn n_sides(&self) -> u32 {
+        3 * self.faces.len() as u32
     }
 
     /// Vertex at the given corner, `3 f + i`.
@@ -229,6 +234,7 @@ type LooseEdge = (u32, u32, f64);
 fn split_collapsed_faces(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<LooseEdge>) {
     let is_proper = |f: &[u32; 3]| f[0] != f[1] && f[1] != f[2] && f[2] != f[0];
     let (proper, collapsed): (Vec<_>, Vec<_>) = mesh.faces().iter().copied().partition(is_proper);
+    let proper = without_copies(proper);
     let loose = collapsed
         .iter()
         .flat_map(|f| [(f[0], f[1]), (f[1], f[2])])
@@ -236,6 +242,13 @@ fn split_collapsed_faces(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<LooseEdge>) {
         .map(|(a, b)| (a, b, vec3::distance(mesh.vertices()[a as usize], mesh.vertices()[b as usize])))
         .collect();
     (proper, loose)
+}
+
+/// The first of all faces with the same vertices: the others change no distance, and at each a search would double its lines.
+fn without_copies(faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let keyed: Vec<(u32, [u32; 3])> = (0..).zip(faces.iter().copied()).collect();
+    let copies = repeated_faces(&keyed);
+    keyed.into_iter().filter(|(f, _)| copies.binary_search(f).is_err()).map(|(_, face)| face).collect()
 }
 
 /// Links the sides of every edge in a ring.

@@ -139,6 +139,34 @@ fn pages_of_a_book_are_joined_at_the_spine() {
 }
 
 #[test]
+fn surfaces_that_lie_on_each_other_take_bounded_time() {
+    // Every square by both diagonals, so that four faces meet at each of its sides; and every face thrice.
+    let n = 24;
+    let grid = zoo::grid(n, n);
+    let side = grid.n_vertices().isqrt() as u32;
+    let squares = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
+    let other = squares.flat_map(|v| {
+        [
+            [v, v + 1, v + side],
+            [v + 1, v + side + 1, v + side],
+            [v, v + 1, v + side + 1],
+            [v, v + side + 1, v + side],
+        ]
+    });
+    let crossed = Mesh::new(grid.vertices().to_vec(), other.collect()).unwrap();
+    let thrice = Mesh::new(grid.vertices().to_vec(), [grid.faces(); 3].concat()).unwrap();
+    for (mesh, most) in [(&crossed, 1.01), (&thrice, 1.0 + 1e-9)] {
+        for (v, distance) in exact(mesh, 0).into_iter().enumerate() {
+            let straight = vec3::distance(mesh.vertices()[v], mesh.vertices()[0]);
+            assert!(
+                (straight * (1.0 - 1e-9)..=straight * most).contains(&distance),
+                "{v}: {distance} for {straight}"
+            );
+        }
+    }
+}
+
+#[test]
 fn degenerate_meshes_do_no_harm() {
     let empty = Mesh::default();
     assert_eq!(solver(&empty).all_pairs().rows(), 0);

@@ -3,6 +3,7 @@
 use super::attributes::{Attributes, MeshFile, ReadInfo};
 use super::error::{ParseError, Parsed};
 use super::format::MeshFormat;
+use super::unmeasured::Unmeasured;
 use crate::Mesh;
 
 /// Vertices, triangles and attributes read so far.
@@ -12,6 +13,7 @@ pub(super) struct MeshBuilder {
     pub(super) corner_uvs: Vec<[[f32; 2]; 3]>,
     pub(super) attributes: Attributes,
     pub(super) info: ReadInfo,
+    unmeasured: Unmeasured,
 }
 
 impl MeshBuilder {
@@ -23,7 +25,16 @@ impl MeshBuilder {
             corner_uvs: Vec::new(),
             attributes: Attributes::default(),
             info,
+            unmeasured: Unmeasured::default(),
         }
+    }
+
+    /// Adds a vertex, and what is wrong where its position is not finite: an error once a face has it.
+    pub(super) fn vertex(&mut self, (place, problem): ([f64; 3], Option<ParseError>)) {
+        if let Some(problem) = problem {
+            self.unmeasured.add(self.vertices.len(), problem);
+        }
+        self.vertices.push(place);
     }
 
     /// Adds a polygon as a fan of triangles; fewer than three corners are counted and left out.
@@ -94,6 +105,7 @@ impl MeshBuilder {
             self.fill_uvs();
             self.attributes.corner_uvs = Some(self.corner_uvs);
         }
+        self.info.warnings.extend(self.unmeasured.settle(&mut self.vertices, &self.faces)?);
         let mesh =
             Mesh::new(self.vertices, self.faces).map_err(|e| ParseError::part("mesh", e.to_string()))?;
         Ok(MeshFile { mesh, attributes: self.attributes, info: self.info })

@@ -36,9 +36,11 @@ mod ply;
 mod point_map;
 mod reference;
 mod stl;
+mod streams;
 mod surface_points;
 mod text;
 mod texture;
+mod unmeasured;
 
 use std::path::Path;
 
@@ -52,6 +54,7 @@ pub use matrix::{
 };
 pub use point_map::{PointMapFormat, read_point_map, write_point_map};
 pub use reference::path_from_bytes;
+pub use streams::{print_error_line, print_line};
 pub use surface_points::{read_surface_points, write_surface_points};
 pub use text::decode_text;
 

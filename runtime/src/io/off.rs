@@ -92,7 +92,7 @@ fn read_vertices(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuild
     let (mut colors, mut uvs) = (Colors::default(), Vec::new());
     for vertex in 0..header.n_vertices {
         let mut words = next_item(lines, "vertex", vertex, header.n_vertices)?;
-        builder.vertices.push(words.point("a coordinate")?);
+        builder.vertex(words.place("a coordinate")?);
         if header.colors {
             colors.read(&mut words, header)?;
         } else if header.normals {
@@ -295,8 +295,9 @@ mod tests {
     #[test]
     fn numbers_that_are_not_finite_are_refused_in_any_spelling() {
         for number in ["1.#INF00", "-1.#IND00", "1.#QNAN0", "nan(ind)", "inf"] {
-            let error =
-                read_text(&format!("OFF\n1 0 0\n0 0 {number}\n")).unwrap_err().in_file(Path::new("a.off"));
+            let error = read_text(&format!("OFF\n2 1 0\n0 0 {number}\n0 0 0\n3 0 1 1\n"))
+                .unwrap_err()
+                .in_file(Path::new("a.off"));
             assert!(error.to_string().contains("line 3: a coordinate is not finite"), "{error}");
         }
     }
@@ -346,7 +347,7 @@ mod tests {
             ("OFF BINARY\n", "save it as a text OFF"),
             ("OFF\n-3 1 0\n", "line 2: the number of vertices is -3"),
             ("OFF\n4000000000 9000000000 0\n0 0 0\n", "promises 4000000000 vertices"),
-            ("OFF\n2 0 0\n0 0 0\n0 nan 0\n", "line 4: a coordinate is not finite: 'nan'"),
+            ("OFF\n2 1 0\n0 0 0\n0 nan 0\n3 0 1 1\n", "line 4: a coordinate is not finite: 'nan'"),
             ("OFF\n2 0 0\n0 0 0\n0 0,5 0\n", "line 4: a coordinate is not a number: '0,5'"),
             ("OFF\n1 1 0\n0 0 0\n3 0 0 1\n", "line 4: vertex 1 is out of range: there are 1"),
             ("OFF\n1 1 0\n0 0 0\n3 0 0\n", "line 4: vertex is missing at the end of the line"),

@@ -120,19 +120,34 @@ impl<'a> Words<'a> {
         self.rest
     }
 
-    /// The next word, which must be a finite number.
-    pub(super) fn finite(&mut self, what: &str) -> Parsed<f64> {
+    /// The next word, which must be a number, and what is wrong where it is not finite.
+    fn number(&mut self, what: &str) -> Parsed<(f64, Option<ParseError>)> {
         let word = self.expect(what)?;
         match float(word) {
-            Some(value) if value.is_finite() => Ok(value),
-            Some(_) => Err(self.error(format!("{what} is not finite: {}", quote(word)))),
+            Some(value) if value.is_finite() => Ok((value, None)),
+            Some(value) => Ok((value, Some(self.error(format!("{what} is not finite: {}", quote(word)))))),
             None => Err(self.error(format!("{what} is not a number: {}", quote(word)))),
+        }
+    }
+
+    /// The next word, which must be a finite number.
+    pub(super) fn finite(&mut self, what: &str) -> Parsed<f64> {
+        match self.number(what)? {
+            (value, None) => Ok(value),
+            (_, Some(problem)) => Err(problem),
         }
     }
 
     /// The next three words, which must be finite numbers.
     pub(super) fn point(&mut self, what: &str) -> Parsed<[f64; 3]> {
         Ok([self.finite(what)?, self.finite(what)?, self.finite(what)?])
+    }
+
+    /// The next three words, which must be numbers, and what is wrong with the first that is not finite.
+    pub(super) fn place(&mut self, what: &str) -> Parsed<([f64; 3], Option<ParseError>)> {
+        let numbers = [self.number(what)?, self.number(what)?, self.number(what)?];
+        let place = [numbers[0].0, numbers[1].0, numbers[2].0];
+        Ok((place, numbers.into_iter().find_map(|(_, problem)| problem)))
     }
 
     /// The next word, which must be an integer.

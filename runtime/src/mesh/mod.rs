@@ -1,4 +1,4 @@
-//! Triangle meshes: the type, what can be wrong with one, its repair and its reduction.
+//! Triangle meshes: the type, what can be wrong with one, its repair, its reduction and its subdivision.
 
 mod closest_point;
 mod decimate;
@@ -7,6 +7,7 @@ mod nearest;
 mod repair;
 mod sampling;
 pub mod shapes;
+mod subdivide;
 mod surface_point;
 #[cfg(test)]
 mod test_data;
@@ -19,9 +20,10 @@ pub mod vec3;
 pub use closest_point::{ClosestPoint, carried_points, closest_points};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate};
 pub use nearest::{nearest_k_vertices, nearest_vertices};
-pub(crate) use repair::weld;
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, repair};
+pub(crate) use repair::{repeated_faces, weld_near};
 pub use sampling::{area_weighted_sampling, farthest_point_sampling, farthest_point_sampling_by};
+pub use subdivide::{Subdivided, subdivide};
 pub use surface_point::{SurfacePoint, vertices_on_surface};
 pub use topology::{Adjacency, Components, Fans, NONE, Topology};
 pub use triangle::closest_weights;

@@ -9,7 +9,7 @@ pub(crate) fn load(path: &str) -> Option<Mesh> {
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
     let file = folder.join(path);
     if !file.exists() {
-        eprintln!("skipped: {path} is not in {}", folder.display());
+        crate::skip::skipped(format!("{path} is not in {}", folder.display()));
         return None;
     }
     Some(crate::io::read_mesh(&file).unwrap().mesh)

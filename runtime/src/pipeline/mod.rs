@@ -1,7 +1,7 @@
 //! The order of the stages at deployment: two meshes in, a dense map out.
 //!
 //! ```text
-//! each shape:  repair -> decimate                                          (Shape::new)
+//! each shape:  repair -> subdivide or decimate                             (Shape::new)
 //!              -> quantities that the descriptor asks for -> descriptor    (Matcher::describe)
 //! a pair:      functional maps -> point maps -> refine -> judge            (Matcher::match_shapes)
 //!              -> other candidates, where the map is doubtful
@@ -12,6 +12,7 @@
 
 mod adapt;
 mod candidates;
+mod describe_pair;
 mod descriptor;
 mod finish;
 mod landmarks;
@@ -34,12 +35,15 @@ use pair::Pair;
 use std::path::Path;
 
 pub use candidates::Candidate;
+pub use describe_pair::Named;
 pub use descriptor::{Descriptor, NetworkDescriptor};
 pub use landmarks::LandmarkError;
 pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
 const SHOT_K: usize = 120;
+/// Meshes of fewer vertices than this are subdivided.
+const SPARSE: usize = 2000;
 /// The model that is built into the library.
 const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
 
@@ -119,10 +123,14 @@ impl Matcher {
         let default_decimate = metadata.map_or(ShapeOptions::default().decimate, |m| m.decimate);
         let solver = metadata.map_or(FmapSolver::LeastSquares, |m| m.solver.for_matching());
         let k = options.k.unwrap_or_else(|| metadata.map_or(SHOT_K, |m| m.k));
+        // Subdivided meshes would not be triangulated alike, nor would a bijection of theirs be one of the inputs' vertices.
+        let one_to_one =
+            matches!(options.refinement, Some(Refinement::Pmf | Refinement::SharedTriangulation));
         let by_default = if network.is_some() { None } else { Some(Refinement::None) };
         Ok(Self {
             shape_options: ShapeOptions {
                 decimate: options.decimate.unwrap_or(default_decimate),
+                subdivide: options.subdivide.unwrap_or((!one_to_one).then_some(SPARSE)),
                 whole_area: None,
             },
             k,
@@ -206,7 +214,7 @@ impl Matcher {
     /// as a part.
     ///
     /// # Errors
-    /// As [`Matcher::describe`], and if `whole_area` is out of range.
+    /// As [`Matcher::describe`], and if `whole_area` is out of range or the refinement is for whole shapes only.
     pub fn describe_part(
         &self,
         name: &str,
@@ -214,6 +222,9 @@ impl Matcher {
         whole_area: f64,
         observer: Observer,
     ) -> Result<DescribedShape, Error> {
+        if self.refinement(true) == Refinement::Icp {
+            return Err(Error::IcpOfPart.in_shape(name));
+        }
         let options = ShapeOptions { whole_area: Some(whole_area), ..self.shape_options.clone() };
         self.describe_by(&options, name, mesh, observer)
     }
@@ -226,6 +237,15 @@ impl Matcher {
         observer: Observer,
     ) -> Result<DescribedShape, Error> {
         let context = self.context(observer);
+        if let Some(network) = &self.network
+            && network.network.metadata().shot.radius != network.shot.radius
+        {
+            observer(Event::Warning(format!(
+                "{name}: the SHOT radius is {}, but the model was trained with {}; leave it as it is for a better map",
+                network.shot.radius,
+                network.network.metadata().shot.radius
+            )));
+        }
         let shape = Shape::new(name, mesh, options, context)?;
         let wanted = self.refinement(options.whole_area.is_some()).eigenpairs(self.k);
         // Small meshes do not have so many eigenfunctions as refinement would like.
@@ -233,7 +253,7 @@ impl Matcher {
         let described_k = self.descriptor().eigenpairs();
         if described_k > shape.max_eigenpairs() {
             observer(Event::Warning(format!(
-                "{name}: {} vertices are few, of which the model sees less than of finer meshes; subdivide the mesh for a better map",
+                "{name}: {} vertices are few, of which the model sees less than of finer meshes; subdivide the mesh for a better map (--subdivide N)",
                 shape.n()
             )));
         }
@@ -247,8 +267,9 @@ impl Matcher {
     /// described as one.
     ///
     /// # Errors
-    /// If the descriptors are of different models or not finite, a shape has too few eigenfunctions, a stage would take more
-    /// memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the shape or the pair.
+    /// If the target is a part, the descriptors are of different models or not finite, a shape has too few eigenfunctions, a
+    /// stage would take more memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the
+    /// shape or the pair.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
@@ -283,8 +304,7 @@ impl Matcher {
 pub fn match_meshes(source: &Mesh, target: &Mesh, options: &MatchOptions) -> Result<Match, Error> {
     let matcher = Matcher::new(options)?;
     let observer: Observer = &crate::events::ignore;
-    let source = matcher.describe("source", source, observer)?;
-    let target = matcher.describe("target", target, observer)?;
+    let [source, target] = matcher.describe_pair(("source", source), ("target", target), false, observer)?;
     matcher.match_shapes(&source, &target, observer)
 }
 
@@ -296,7 +316,8 @@ mod tests {
 
     fn matcher(k: usize) -> Matcher {
         let (descriptor, k) = (DescriptorKind::Shot, Some(k));
-        Matcher::new(&MatchOptions { descriptor, k, ..MatchOptions::default() }).unwrap()
+        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() })
+            .unwrap()
     }
 
     #[test]

@@ -117,6 +117,9 @@ pub struct MatchOptions {
     /// Meshes of more vertices are decimated to so many, 4 or more; `Some(None)`: never. Default: the model's; 15000 for
     /// SHOT.
     pub decimate: Option<Option<usize>>,
+    /// Meshes of fewer vertices are subdivided to so many; `Some(None)`: never. Default: 2000; never
+    /// where the refinement is the product manifold filter, whose map is one of the vertices that there are.
+    pub subdivide: Option<Option<usize>>,
     /// Refinement. Default: what suits the solver, [`Refinement::suiting`]; none for SHOT.
     pub refinement: Option<Refinement>,
     /// Upscaling of the map of decimated meshes. Default: along the surface.

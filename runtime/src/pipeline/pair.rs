@@ -80,6 +80,7 @@ impl Judge<'_> {
 impl Pair<'_> {
     pub(super) fn run(&self, landmarks: &[(u32, u32)]) -> Result<Match, Error> {
         let (matcher, is_part) = (self.matcher, self.is_part());
+        self.check_part()?;
         let landmarks = match landmarks {
             [] => None,
             given => Some(Landmarks::new(self, given)?),
@@ -120,6 +121,20 @@ impl Pair<'_> {
 
     pub(super) fn is_part(&self) -> bool {
         self.source.shape.whole_area.is_some()
+    }
+
+    /// Refuses a target that is a part, and doubts a part that is larger than its whole.
+    fn check_part(&self) -> Result<(), Error> {
+        if self.target.shape.whole_area.is_some() {
+            return Err(Error::PartAsTarget);
+        }
+        let share = self.source.shape.full_mesh.area() / self.source.shape.unit_area();
+        if share > 1.1 {
+            self.warn(&format!(
+                "the part has {share:.3} times the area of the whole: both must be in one unit of length, the part first"
+            ));
+        }
+        Ok(())
     }
 
     pub(super) fn timed<T>(&self, stage: &'static str, run: impl FnOnce() -> T) -> T {
@@ -250,7 +265,8 @@ impl Pair<'_> {
             meshes: follows.then(|| [self.source.shape.mesh(), self.target.shape.mesh()]),
         };
         let [source, target] = self.bases(self.refined_k())?;
-        let filtered = self.timed("pmf", || pmf(&start, &source, &target, hints, &PmfOptions::default()))?;
+        let options = PmfOptions { part: self.is_part(), ..PmfOptions::default() };
+        let filtered = self.timed("pmf", || pmf(&start, &source, &target, hints, &options))?;
         if follows && filtered.info.edges_kept.is_none() {
             self.warn(
                 "the meshes are not triangulated alike; the map is that of the product manifold filter",
@@ -295,7 +311,8 @@ impl Pair<'_> {
         let decimated = source.is_decimated() || target.is_decimated();
         match (&found.embedding, self.matcher.upscaling) {
             (Some(embedding), upscaling) if !decimated || upscaling == Upscaling::Surface => {
-                let map = self.timed("surface points", || on_inputs(source, target, &found.map, embedding, doubt));
+                let map =
+                    self.timed("surface points", || on_inputs(source, target, &found.map, embedding, doubt));
                 Ok((map, None))
             }
             (_, upscaling) => full_by_functional_map(self, &found.map, upscaling, doubt),

@@ -21,12 +21,11 @@ pub fn position_colors(mesh: &Mesh) -> Vec<[u8; 4]> {
     mesh.vertices().iter().map(|p| hue(unit(p, axes[0]), unit(p, axes[1]), unit(p, axes[2]))).collect()
 }
 
-/// The colours of the matched vertices, `[n_source]` RGBA; [`UNMATCHED_COLOR`] where there is none.
-///
-/// # Panics
-/// If a match is beyond `colors_target`, `[n_target]`.
+/// The colours of the matched vertices, `[n_source]` RGBA; [`UNMATCHED_COLOR`] where there is none among `colors_target`,
+/// `[n_target]`.
 pub fn map_colors(map: &PointMap, colors_target: &[[u8; 4]]) -> Vec<[u8; 4]> {
-    (0..map.len()).map(|i| map.get(i).map_or(UNMATCHED_COLOR, |t| colors_target[t as usize])).collect()
+    let color = |matched: Option<u32>| colors_target.get(matched? as usize).copied();
+    map.iter().map(|matched| color(matched).unwrap_or(UNMATCHED_COLOR)).collect()
 }
 
 fn bounds(mesh: &Mesh) -> ([f64; 3], [f64; 3]) {

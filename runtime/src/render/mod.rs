@@ -2,6 +2,7 @@
 
 mod blend;
 mod colormap;
+mod error;
 mod fit;
 mod pair;
 mod picture;
@@ -10,6 +11,7 @@ mod uv;
 mod viewer;
 
 pub use colormap::{UNMATCHED_COLOR, map_colors, position_colors};
+pub use error::RenderError;
 pub use fit::fit_skeleton;
 pub use pair::side_by_side;
 pub use picture::{Picture, pair_picture, picture, textured_picture};

@@ -1,9 +1,9 @@
 //! Both shapes of a pair in one mesh, side by side, coloured by the map.
 
+use super::error::{RenderError, check_map};
 use super::{map_colors, position_colors};
 use crate::Mesh;
 use crate::io::Attributes;
-use crate::mesh::MeshError;
 use crate::point_map::PointMap;
 
 /// The source to the left of the target, brought to the same size, matches in the same colour.
@@ -11,11 +11,10 @@ use crate::point_map::PointMap;
 /// Vertices and faces of the source come first, each shape with a largest extent of 1.
 ///
 /// # Errors
-/// If a coordinate overflows, or both together have more vertices than 32-bit indices can name.
-///
-/// # Panics
-/// If a match is no vertex of the target.
-pub fn side_by_side(source: &Mesh, target: &Mesh, map: &PointMap) -> Result<(Mesh, Attributes), MeshError> {
+/// If the map is not one of these meshes, a coordinate overflows, or both together have more vertices than 32-bit indices can
+/// name.
+pub fn side_by_side(source: &Mesh, target: &Mesh, map: &PointMap) -> Result<(Mesh, Attributes), RenderError> {
+    check_map(map, source, target)?;
     let colors_target = position_colors(target);
     let mut colors = map_colors(map, &colors_target);
     colors.extend(colors_target);

@@ -1,6 +1,6 @@
 //! Pictures of meshes, drawn in software: no window, no graphics card.
 
-use super::side_by_side;
+use super::{RenderError, side_by_side};
 use crate::Mesh;
 use crate::mesh::MeshError;
 use crate::point_map::PointMap;
@@ -23,13 +23,13 @@ const FILL: f64 = 0.94;
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 
 /// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, 1 or more, twice as
-/// many columns. Errors and panics as of [`side_by_side`].
+/// many columns. Errors as of [`side_by_side`].
 pub fn pair_picture(
     source: &Mesh,
     target: &Mesh,
     map: &PointMap,
     width: usize,
-) -> Result<Picture, MeshError> {
+) -> Result<Picture, RenderError> {
     let half = (width / 2).max(1);
     let (left, right) = (turned(source)?, turned(target)?);
     let (mesh, attributes) = side_by_side(&left, &right, map)?;

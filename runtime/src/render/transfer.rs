@@ -5,6 +5,7 @@
 //! [`Donors::interpolated`] finds places within the giver's triangles.
 
 use super::blend::{Blend, blends};
+use super::error::{RenderError, check_target};
 use super::uv::corner_uvs;
 use crate::io::{Attributes, IntegerField, Skin};
 use crate::mesh::{Topology, vec3};
@@ -37,9 +38,10 @@ impl Donors {
     /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several that match
     /// the same vertex, from the one of the lowest index.
     ///
-    /// # Panics
+    /// # Errors
     /// If a match is no vertex of the target.
-    pub fn of_target(map: &PointMap, target: &Mesh) -> Self {
+    pub fn of_target(map: &PointMap, target: &Mesh) -> Result<Self, RenderError> {
+        check_target(map, target)?;
         let mut donor: Vec<Option<u32>> = vec![None; target.n_vertices()];
         let mut distance = vec![f64::INFINITY; target.n_vertices()];
         let mut queue = BinaryHeap::new();
@@ -64,7 +66,7 @@ impl Donors {
                 }
             }
         }
-        Self::new(donor)
+        Ok(Self::new(donor))
     }
 
     fn new(nearest: Vec<Option<u32>>) -> Self {
@@ -289,7 +291,7 @@ mod tests {
         let values = Matrix::from_fn(giver.n_vertices(), 2, |i, j| (2 * i + j) as f64);
         let moved = transfer_values(&values, &Donors::of_source(&map));
         assert!((0..moved.rows()).all(|v| moved.row(v) == values.row(donor_of[v] as usize)));
-        let back = transfer_values(&moved, &Donors::of_target(&map, &giver));
+        let back = transfer_values(&moved, &Donors::of_target(&map, &giver).unwrap());
         assert_eq!(back, values);
         let landmarks = transfer_landmarks(&donor_of[..5], &giver, &receiver, &Donors::of_source(&map));
         assert_eq!(landmarks, (0..5).map(Some).collect::<Vec<_>>());
@@ -299,7 +301,7 @@ mod tests {
     fn vertices_that_nothing_maps_to_take_from_the_nearest() {
         let mesh = grid(10, 10);
         let map = PointMap::new(vec![0, 99, PointMap::UNMATCHED], 100);
-        let donors = Donors::of_target(&map, &mesh);
+        let donors = Donors::of_target(&map, &mesh).unwrap();
         let corner = |v: usize, w: u32| vec3::distance(mesh.vertices()[v], mesh.vertices()[w as usize]);
         for (v, donor) in donors.iter().enumerate() {
             let nearer = if corner(v, 0) < corner(v, 99) { 0 } else { 1 };

@@ -1,6 +1,7 @@
 //! A self-contained HTML page with both shapes of a pair, coloured by the map: turn and zoom with the mouse, hover a point to
 //! see its match. It opens from disk and needs no network.
 
+use super::error::{RenderError, check_map};
 use super::{map_colors, position_colors};
 use crate::Mesh;
 use crate::mesh::vec3;
@@ -28,8 +29,12 @@ pub struct ViewerPair<'a> {
     pub caption: &'a str,
 }
 
-/// The whole page. Panics if a match is no vertex of the target.
-pub fn viewer_html(pair: &ViewerPair) -> String {
+/// The whole page.
+///
+/// # Errors
+/// If the map is not one of these meshes.
+pub fn viewer_html(pair: &ViewerPair) -> Result<String, RenderError> {
+    check_map(pair.map, pair.source, pair.target)?;
     let colors_target = position_colors(pair.target);
     let colors_source = map_colors(pair.map, &colors_target);
     let targets: Vec<i32> = (0..pair.map.len()).map(|i| pair.map.get(i).map_or(-1, |t| t as i32)).collect();
@@ -48,7 +53,7 @@ pub fn viewer_html(pair: &ViewerPair) -> String {
     });
     // "</" would end the script element early.
     let data = data.to_string().replace("</", "<\\/");
-    TEMPLATE.replace("__TITLE__", &escaped(pair.title)).replace("__DATA__", &data)
+    Ok(TEMPLATE.replace("__TITLE__", &escaped(pair.title)).replace("__DATA__", &data))
 }
 
 /// From light grey, no doubt, by yellow to red.
@@ -143,7 +148,8 @@ mod tests {
             target: &mesh,
             map: &map,
             caption: "",
-        });
+        })
+        .unwrap();
         assert!(!page.contains("__DATA__") && !page.contains("__TITLE__"));
         assert!(page.contains("<title>a &lt;b> &amp; c</title>"));
         assert_eq!(page.matches("</script>").count(), 1);

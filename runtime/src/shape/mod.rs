@@ -1,18 +1,20 @@
 //! One shape: the mesh that quantities live on, the way back to the input's vertices, and a store of named quantities.
 //!
-//! [`Shape::new`] repairs and decimates. Everything else is a quantity ([`quantities`]), computed when first asked for: the
+//! [`Shape::new`] repairs, and subdivides or decimates. Everything else is a quantity ([`quantities`]), computed when first asked for: the
 //! Laplacian, the eigenbasis, gradients of the eigenfunctions, the wave kernel signature, SHOT, the eigenbasis at full
 //! resolution. With a [`Cache`] each is kept under (mesh, quantity, its own options, its version), so that another `k` does
 //! not compute SHOT anew, and a model that takes no SHOT never computes it.
 
+mod pieces;
 pub mod quantities;
 mod way_back;
 
 use crate::cache::{Cache, CacheKey, Decoder, Encoder};
 use crate::error::Error;
-use crate::events::{Observer, timed};
+use crate::events::{Event, Observer, timed};
 use crate::mesh::{
-    DecimateOptions, Mesh, RepairOptions, SurfacePoint, carried_points, decimate, repair, vertices_on_surface,
+    DecimateOptions, Mesh, RepairOptions, Subdivided, SurfacePoint, carried_points, decimate, repair,
+    subdivide, vertices_on_surface,
 };
 use quantities::Store;
 use serde::{Deserialize, Serialize};
@@ -25,6 +27,9 @@ pub use way_back::WayBack;
 pub struct ShapeOptions {
     /// Meshes of more vertices than this are decimated to it; 4 or more, `None`: never. Default 15000, as in the paper.
     pub decimate: Option<usize>,
+    /// Meshes of fewer vertices than this are subdivided to so many, or to as many as `decimate` allows; `None`: never. Default
+    /// `None`.
+    pub subdivide: Option<usize>,
     /// For a part of a shape: the area of the whole, in squared units of the mesh, above 0. The SHOT radius is then relative
     /// to it, and so is [`Shape::unit_basis`]. `None`: the shape is whole. Default `None`.
     pub whole_area: Option<f64>,
@@ -32,7 +37,7 @@ pub struct ShapeOptions {
 
 impl Default for ShapeOptions {
     fn default() -> Self {
-        Self { decimate: Some(15_000), whole_area: None }
+        Self { decimate: Some(15_000), subdivide: None, whole_area: None }
     }
 }
 
@@ -65,12 +70,14 @@ impl Context<'_> {
 pub struct Shape {
     /// Name for messages: the file's name, or what the caller chose.
     pub name: String,
-    /// The repaired mesh at full resolution, `[n_full]` vertices.
+    /// The repaired mesh at full resolution, subdivided where it is sparse, `[n_full]` vertices.
     pub full_mesh: Mesh,
     /// The decimated mesh, `[n]` vertices; absent for small meshes.
     decimated: Option<Mesh>,
     /// The mesh as it was read, where repair changed it.
     input: Option<Mesh>,
+    /// What the user should know of the mesh, a line each.
+    warnings: String,
     /// From the vertices of the meshes to the input's and back.
     pub way_back: WayBack,
     /// For a part of a shape, the area of the whole ([`ShapeOptions::whole_area`]), in squared units of the mesh.
@@ -86,6 +93,7 @@ impl Clone for Shape {
             full_mesh: self.full_mesh.clone(),
             decimated: self.decimated.clone(),
             input: self.input.clone(),
+            warnings: self.warnings.clone(),
             way_back: self.way_back.clone(),
             whole_area: self.whole_area,
             key: self.key,
@@ -97,11 +105,12 @@ impl Clone for Shape {
 /// A point of one of a shape's meshes is not farther from its place on another than this, relative to sqrt(area).
 const CARRIED_WITHIN: f64 = 0.05;
 
-/// Raise where repair or decimation give another mesh.
-const MESH_VERSION: u32 = 3;
+/// Raise where repair, subdivision or decimation give another mesh.
+const MESH_VERSION: u32 = 4;
 
 impl Shape {
-    /// Repairs and, where it is larger than the options say, decimates a mesh as read; `name` is for messages.
+    /// Repairs and, where it is smaller or larger than the options say, subdivides or decimates a mesh as read; `name` is for
+    /// messages.
     ///
     /// # Errors
     /// If repair leaves no face, the area of the whole or the decimation target is out of range, or the cache cannot be
@@ -114,17 +123,27 @@ impl Shape {
         options.check()?;
         let key = mesh_key(mesh, options);
         let found = context.cache.and_then(|cache| cache.fetch("mesh", key, context.observer));
+        let observer = context.observer;
         if let Some(shape) = found.and_then(|bytes| Self::decode(name, options, key, &bytes)) {
+            shape.warn(observer);
             return Ok(shape);
         }
-        let observer = context.observer;
         let repaired = timed(observer, name, "repair", || repair(mesh, &RepairOptions::default()))?;
-        let mut way_back = WayBack {
-            input_of_full: repaired.input_of_repaired,
-            full_of_input: repaired.repaired_of_input.iter().map(|v| v.unwrap_or(WayBack::NONE)).collect(),
-            full_of_work: None,
+        let warnings = pieces::warnings(mesh, &repaired);
+        let fewest = options.subdivide.map(|n| n.min(options.decimate.unwrap_or(n)));
+        let is_sparse = fewest.filter(|&fewest| repaired.mesh.n_vertices() < fewest);
+        let (full_mesh, mut way_back) = match is_sparse {
+            Some(fewest) => {
+                let Subdivided { mesh: fine, nearest } =
+                    timed(observer, name, "subdivide", || subdivide(&repaired.mesh, fewest));
+                let way_back = WayBack::of_repaired(mesh, &repaired, &fine).subdivided(&nearest);
+                (fine, way_back)
+            }
+            None => {
+                let way_back = WayBack::of_repaired(mesh, &repaired, &repaired.mesh);
+                (repaired.mesh, way_back)
+            }
         };
-        let full_mesh = repaired.mesh;
         let mut decimated = None;
         if let Some(target) = options.decimate.filter(|&target| full_mesh.n_vertices() > target) {
             let result = timed(observer, name, "decimate", || {
@@ -134,7 +153,9 @@ impl Shape {
             decimated = Some(result.mesh);
         }
         let input = (full_mesh != *mesh).then(|| mesh.clone());
-        let shape = Self::assemble(name, options, key, Meshes { full_mesh, decimated, input }, way_back);
+        let shape =
+            Self::assemble(name, options, key, Meshes { full_mesh, decimated, input, warnings }, way_back);
+        shape.warn(observer);
         if let Some(cache) = context.cache {
             cache.put("mesh", key, &shape.encode())?;
         }
@@ -145,11 +166,26 @@ impl Shape {
         name: &str,
         options: &ShapeOptions,
         key: CacheKey,
-        Meshes { full_mesh, decimated, input }: Meshes,
+        Meshes { full_mesh, decimated, input, warnings }: Meshes,
         way_back: WayBack,
     ) -> Self {
         let (name, whole_area) = (name.to_string(), options.whole_area);
-        Self { name, full_mesh, decimated, input, way_back, whole_area, key, store: Mutex::default() }
+        Self {
+            name,
+            full_mesh,
+            decimated,
+            input,
+            warnings,
+            way_back,
+            whole_area,
+            key,
+            store: Mutex::default(),
+        }
+    }
+
+    /// Tells what the user should know of the mesh, each time that it is used.
+    fn warn(&self, observer: Observer) {
+        self.warnings.lines().for_each(|text| observer(Event::Warning(format!("{}: {text}", self.name))));
     }
 
     /// The key of the processed mesh: the input's content, the options and their version. Quantities derive theirs from it.
@@ -180,8 +216,12 @@ impl Shape {
     /// Where the vertices of the full mesh are on the working mesh, `[n_full]`.
     pub fn full_on_work(&self) -> Vec<Option<SurfacePoint>> {
         let Some(full_of_work) = &self.way_back.full_of_work else { return vertices_on_surface(self.mesh()) };
-        let mut places =
-            carried_points(&vertices_on_surface(&self.full_mesh), &self.full_mesh, self.mesh(), CARRIED_WITHIN);
+        let mut places = carried_points(
+            &vertices_on_surface(&self.full_mesh),
+            &self.full_mesh,
+            self.mesh(),
+            CARRIED_WITHIN,
+        );
         // Vertices of both are exactly there.
         for (place, &full) in vertices_on_surface(self.mesh()).into_iter().zip(full_of_work) {
             places[full as usize] = place;
@@ -213,6 +253,7 @@ impl Shape {
         encode_mesh(&mut out, &self.full_mesh);
         out.value(u8::from(self.input.is_some()));
         self.input.iter().for_each(|input| encode_mesh(&mut out, input));
+        out.slice(self.warnings.as_bytes());
         out.slice(&self.way_back.input_of_full).slice(&self.way_back.full_of_input);
         let decimated = self.decimated.as_ref().zip(self.way_back.full_of_work.as_ref());
         out.value(u8::from(decimated.is_some()));
@@ -230,6 +271,7 @@ impl Shape {
             0 => None,
             _ => Some(decode_mesh(&mut input)?),
         };
+        let warnings = String::from_utf8(input.slice()?).ok()?;
         let (input_of_full, full_of_input) = (input.slice()?, input.slice()?);
         let (mut decimated, mut full_of_work) = (None, None);
         if input.value::<u8>()? != 0 {
@@ -238,7 +280,7 @@ impl Shape {
         }
         let way_back = WayBack { input_of_full, full_of_input, full_of_work };
         let fits = way_back.fits(&full_mesh, decimated.as_ref());
-        let meshes = Meshes { full_mesh, decimated, input: as_read };
+        let meshes = Meshes { full_mesh, decimated, input: as_read, warnings };
         fits.then(|| Self::assemble(name, options, key, meshes, way_back))
     }
 }
@@ -248,6 +290,7 @@ struct Meshes {
     full_mesh: Mesh,
     decimated: Option<Mesh>,
     input: Option<Mesh>,
+    warnings: String,
 }
 
 fn mesh_key(mesh: &Mesh, options: &ShapeOptions) -> CacheKey {

@@ -250,7 +250,7 @@ impl Shape {
         let (descriptors, info) = timed(context.observer, &self.name, "shot", || shot(self.mesh(), &scaled))?;
         if info.zero_rows > self.n() / 10 {
             (context.observer)(Event::Warning(format!(
-                "{}: {} of {} vertices have too few neighbours for a descriptor; a larger SHOT radius may help",
+                "{}: {} of {} vertices have too few neighbours for a descriptor; a finer mesh would help (--subdivide N)",
                 self.name,
                 info.zero_rows,
                 self.n()

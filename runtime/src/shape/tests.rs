@@ -81,3 +81,54 @@ fn the_way_back_leads_to_the_same_place() {
         assert_eq!(shape.mesh().vertices()[v as usize], mesh.vertices()[input as usize]);
     }
 }
+
+#[test]
+fn a_sparse_mesh_is_subdivided_and_its_vertices_come_first() {
+    let sparse = bumpy_sphere(2, 1);
+    let options = ShapeOptions { subdivide: Some(700), ..ShapeOptions::default() };
+    let shape = Shape::new("sphere", &sparse, &options, Context::SILENT).unwrap();
+    assert_eq!((shape.n(), shape.n_input()), (700, 162));
+    assert_eq!(shape.input_mesh(), &sparse);
+    assert_eq!(shape.way_back.work_of_input(), (0..162).collect::<Vec<u32>>());
+    for v in 0..700u32 {
+        let input = shape.way_back.input_of_work(v);
+        assert!(v >= 162 || input == v);
+        let distance =
+            |i: usize| crate::mesh::vec3::distance(shape.mesh().vertices()[v as usize], sparse.vertices()[i]);
+        let edge = 2.0 * (sparse.area() / 162.0).sqrt();
+        assert!(distance(input as usize) < edge, "vertex {v}");
+    }
+    // Never beyond what decimation would leave.
+    let options = ShapeOptions { decimate: Some(400), ..options };
+    assert_eq!(Shape::new("sphere", &sparse, &options, Context::SILENT).unwrap().n(), 400);
+}
+
+#[test]
+fn small_pieces_follow_the_rest_and_are_named_each_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::open(folder.path()).unwrap();
+    let body = bumpy_sphere(3, 1);
+    let at = body.vertices()[100];
+    let button = crate::mesh::shapes::transformed(
+        &icosphere(1),
+        crate::mesh::shapes::rotation([0.0, 0.0, 1.0], 0.0),
+        0.02,
+        at.map(|x| 1.05 * x),
+    );
+    let mesh = crate::mesh::shapes::joined(&[&button, &body]);
+    for _ in 0..2 {
+        let events = StdMutex::new(Vec::new());
+        let observer = |event| events.lock().unwrap().push(event);
+        let context = Context { cache: Some(&cache), observer: &observer };
+        let shape = Shape::new("coat", &mesh, &ShapeOptions::default(), context).unwrap();
+        assert_eq!(shape.mesh(), &body);
+        let events = events.into_inner().unwrap();
+        let named = events.iter().any(|event| matches!(event, Event::Warning(text) if text.starts_with("coat: 1 small pieces, 42 of 684 ")));
+        assert!(named, "{events:?}");
+        for v in 0..42 {
+            let full = shape.way_back.full_of_input[v];
+            let distance = crate::mesh::vec3::distance(body.vertices()[full as usize], at);
+            assert!(distance < 0.3, "vertex {v} follows one {distance} away");
+        }
+    }
+}

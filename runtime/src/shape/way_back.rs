@@ -1,14 +1,16 @@
 //! From the vertices that quantities live on to those of the input, and back.
 
 use crate::Mesh;
+use crate::mesh::{Repaired, nearest_vertices};
 
 /// Index maps between the input mesh, the repaired mesh ("full") and the mesh that quantities live on ("work"), which is the
 /// full one or a decimated one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WayBack {
-    /// Input vertex of each vertex of the full mesh, `[n_full]`.
+    /// Input vertex of each vertex of the full mesh, of one that subdivision made the nearest, `[n_full]`.
     pub input_of_full: Vec<u32>,
-    /// For each input vertex its vertex of the full mesh, [`WayBack::NONE`] where repair dropped it, `[n_input]`.
+    /// For each input vertex its vertex of the full mesh, `[n_input]`: of one in a small piece that repair left out the nearest,
+    /// of one without a face [`WayBack::NONE`].
     pub full_of_input: Vec<u32>,
     /// For each vertex of the decimated mesh its vertex of the full mesh, `[n]`; `None` where nothing was decimated.
     pub full_of_work: Option<Vec<u32>>,
@@ -17,6 +19,24 @@ pub struct WayBack {
 impl WayBack {
     /// Stands in index maps for "no such vertex".
     pub const NONE: u32 = u32::MAX;
+
+    /// From the repaired mesh of an input; `full` is the repaired mesh or one that begins with its vertices.
+    pub(super) fn of_repaired(input: &Mesh, repaired: &Repaired, full: &Mesh) -> Self {
+        let mut full_of_input: Vec<u32> =
+            repaired.repaired_of_input.iter().map(|v| v.unwrap_or(Self::NONE)).collect();
+        let dropped = &repaired.dropped_vertices;
+        let places: Vec<[f64; 3]> = dropped.iter().map(|&v| input.vertices()[v as usize]).collect();
+        for (&vertex, nearest) in dropped.iter().zip(nearest_vertices(full.vertices(), &places)) {
+            full_of_input[vertex as usize] = nearest;
+        }
+        Self { input_of_full: repaired.input_of_repaired.clone(), full_of_input, full_of_work: None }
+    }
+
+    /// The same for a subdivided full mesh, of which the nearest vertices of the one before are given, `[n_full]`.
+    pub(super) fn subdivided(self, nearest: &[u32]) -> Self {
+        let input_of_full = nearest.iter().map(|&v| self.input_of_full[v as usize]).collect();
+        Self { input_of_full, ..self }
+    }
 
     /// Vertex of the full mesh of a vertex of the working mesh.
     ///

@@ -7,7 +7,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+#[path = "skipped.rs"]
+mod skip;
+
 use fmnet::{Matrix, Mesh};
+use skip::skipped;
 
 /// The folder of the data, `FMNET_DATA` or `../shared/data` next to the repository.
 fn data() -> PathBuf {
@@ -34,7 +38,7 @@ fn description(name: &str) -> serde_json::Value {
 pub(crate) fn reference_rows(name: &str) -> Option<(Mesh, Vec<i32>, Matrix<f32>)> {
     let path = reference().join(format!("{name}_shot.npz"));
     if !path.exists() {
-        eprintln!("skipped: {} is absent; set FMNET_DATA to the data folder", path.display());
+        skipped(format!("{} is absent; set FMNET_DATA to the data folder", path.display()));
         return None;
     }
     let mut archive = npyz::npz::NpzArchive::open(&path).unwrap();

@@ -56,18 +56,28 @@ fn faust_registered(folder: &Path, meshes: Vec<PathBuf>) -> Found {
 
 fn faust_scans(folder: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
     let scans = mesh_files(&folder.join("scans"))?;
+    let registrations = folder.join("registrations");
     let registration = |name: &str| {
         let name = name.replace("scan", "reg");
-        let folder = folder.join("registrations");
-        ["ply", "off", "obj"].iter().map(|e| folder.join(format!("{name}.{e}"))).find(|p| p.is_file())
+        ["ply", "off", "obj"].iter().map(|e| registrations.join(format!("{name}.{e}"))).find(|p| p.is_file())
     };
+    // FAUST publishes no registrations of its test scans.
+    let scans = scans.into_iter().filter(|mesh| !stem(mesh).starts_with("test_scan_"));
     let shape = |mesh: PathBuf| {
         let name = stem(&mesh);
         let split = faust_split(numbered(&name, "tr_scan_").unwrap_or(0));
-        let correspondence = Correspondence::NearestTo(registration(&name)?);
-        Some(ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, whole: None })
+        let Some(registration) = registration(&name) else {
+            let reason = format!(
+                "there is no registration {}.ply of it in {}; put it there or take the scan away",
+                name.replace("scan", "reg"),
+                registrations.display()
+            );
+            return Err(DatasetError::Mesh { path: mesh, reason });
+        };
+        let correspondence = Correspondence::NearestTo(registration);
+        Ok(ShapeEntry { name, mesh, group: "faust".into(), correspondence, split, whole: None })
     };
-    Ok(scans.into_iter().filter_map(shape).collect())
+    scans.map(shape).collect()
 }
 
 fn faust_split(index: usize) -> Split {
@@ -159,6 +169,16 @@ mod tests {
             assert!(!shapes.is_empty() && shapes.iter().all(|s| s.group == group), "{layout}: {shapes:?}");
         }
         assert!(recognise(folder_with(&["notes.txt"]).path()).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_scan_without_registration_is_named_unless_it_is_of_the_test_set() {
+        let registered = ["scans/tr_scan_000.ply", "registrations/tr_reg_000.ply"];
+        let folder = folder_with(&[&registered[..], &["scans/test_scan_000.ply"]].concat());
+        assert_eq!(recognise(folder.path()).unwrap().unwrap().1.len(), 1);
+        let folder = folder_with(&[&registered[..], &["scans/tr_scan_001.ply"]].concat());
+        let error = recognise(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("tr_scan_001.ply: there is no registration tr_reg_001.ply"), "{error}");
     }
 
     #[test]

@@ -13,8 +13,11 @@ pub(crate) use shrec16::TRAINING_PARTS;
 
 use fmnet::Mesh;
 use fmnet::io::{IoError, read_mesh, read_point_map, read_surface_points};
-use fmnet::mesh::{SurfacePoint, closest_points, vec3, vertices_on_surface};
+use fmnet::mesh::{
+    RepairError, RepairOptions, SurfacePoint, closest_points, repair, vec3, vertices_on_surface,
+};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -109,6 +112,14 @@ pub enum DatasetError {
         /// What is wrong, and where.
         reason: String,
     },
+    /// A mesh cannot be used.
+    #[error("{path}: {reason}")]
+    Mesh {
+        /// The mesh file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A correspondence does not fit its mesh.
     #[error("{path}: {reason}")]
     Correspondence {
@@ -146,18 +157,48 @@ impl Dataset {
     }
 }
 
+/// Checks that the shapes of each group have equally many points, given the number of each: else they do not correspond, whatever
+/// their names say.
+///
+/// # Errors
+/// If two shapes of a group do not.
+pub fn check_groups<'a>(
+    shapes: impl IntoIterator<Item = (&'a ShapeEntry, usize)>,
+) -> Result<(), DatasetError> {
+    let mut first: BTreeMap<&str, (&ShapeEntry, usize)> = BTreeMap::new();
+    for (shape, points) in shapes {
+        let (other, expected) = *first.entry(&shape.group).or_insert((shape, points));
+        if points != expected {
+            let reason = format!(
+                "{points} points, but {}, of the same group '{}', has {expected}: the shapes do not correspond point by point; \
+                 move them apart, or say in a {} which of them do",
+                other.mesh.display(),
+                shape.group,
+                manifest::FILE_NAME
+            );
+            return Err(DatasetError::Mesh { path: shape.mesh.clone(), reason });
+        }
+    }
+    Ok(())
+}
+
 impl ShapeEntry {
     /// Whether it is a part of a shape.
     pub fn is_part(&self) -> bool {
         self.whole.is_some()
     }
 
-    /// For a part, the area of the whole, in squared units of its mesh.
+    /// For a part, the area of the whole, in squared units of its mesh; that of the repaired mesh, as in matching.
     ///
     /// # Errors
-    /// If the whole cannot be read.
+    /// If the whole cannot be read or repaired.
     pub fn whole_area(&self) -> Result<Option<f64>, DatasetError> {
-        self.whole.as_ref().map(|whole| Ok(read_mesh(whole)?.mesh.area())).transpose()
+        let area = |path: &PathBuf| {
+            let repaired = repair(&read_mesh(path)?.mesh, &RepairOptions::default());
+            let wrong = |e: RepairError| DatasetError::Mesh { path: path.clone(), reason: e.to_string() };
+            Ok(repaired.map_err(wrong)?.mesh.area())
+        };
+        self.whole.as_ref().map(area).transpose()
     }
 
     /// Reads the mesh.

@@ -98,7 +98,7 @@ fn points_in_a_hole_of_a_scan_are_missing() {
         write_mesh(&folder.path().join(name), mesh, &Attributes::default()).unwrap();
     };
     save("registrations/tr_reg_007.off", &registration);
-    // The upper half, in reverse order and off by a little; its scan has no registration of its own number.
+    // The upper half, in reverse order and off by a little.
     let upper: Vec<u32> = (0..registration.n_vertices() as u32)
         .rev()
         .filter(|&i| registration.vertices()[i as usize][2] > 0.3)
@@ -106,7 +106,8 @@ fn points_in_a_hole_of_a_scan_are_missing() {
     let vertices = upper.iter().map(|&i| registration.vertices()[i as usize]).collect();
     let scan = transformed(&Mesh::new(vertices, vec![[0, 1, 2]]).unwrap(), STRAIGHT, 1.001, [0.0; 3]);
     save("scans/tr_scan_007.off", &scan);
-    save("scans/tr_scan_008.off", &scan);
+    // FAUST publishes no registrations of these.
+    save("scans/test_scan_008.off", &scan);
     let dataset = Dataset::open(folder.path()).unwrap();
     assert_eq!(dataset.shapes.len(), 1, "a scan without registration has no ground truth");
     let points = points(shape(&dataset, "tr_scan_007")).unwrap();
@@ -239,4 +240,19 @@ fn every_correspondence_gives_points_on_the_surface() {
         Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0; 3]], vec![[0, 1, 2]]).unwrap();
     let identity = ShapeEntry { correspondence: Correspondence::Identity, ..dataset.shapes[0].clone() };
     assert_eq!(identity.surface_points(&lone).unwrap()[3], None);
+}
+
+#[test]
+fn meshes_that_only_look_like_a_dataset_do_not_correspond() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, mesh) in [("part1.off", icosphere(1)), ("part2.off", icosphere(2)), ("lid1.off", icosphere(0))]
+    {
+        write_mesh(&folder.path().join(name), &mesh, &Attributes::default()).unwrap();
+    }
+    let dataset = Dataset::open(folder.path()).unwrap();
+    assert_eq!(dataset.layout, "TOSCA");
+    let counted = |shape| (shape, points(shape).unwrap().len());
+    let error = check_groups(dataset.shapes.iter().map(counted)).unwrap_err().to_string();
+    assert!(error.contains("part2.off: 162 points, but ") && error.contains("'part', has 42"), "{error}");
+    check_groups(dataset.shapes.iter().filter(|shape| shape.name != "part2").map(counted)).unwrap();
 }

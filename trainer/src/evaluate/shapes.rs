@@ -1,6 +1,6 @@
 //! The shapes of a dataset as evaluation needs them: meshes as they are on disk, their points, geodesics on the targets.
 
-use crate::dataset::{Dataset, DatasetError, MISSING};
+use crate::dataset::{Dataset, DatasetError, MISSING, check_groups};
 use fmnet::Mesh;
 use fmnet::eval::{EvalError, GroundTruth};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
@@ -35,6 +35,7 @@ pub(super) fn load(
             }
         }
     }
+    check_groups(shapes.iter().map(|(&index, shape)| (&dataset.shapes[index], shape.points.len())))?;
     Ok(shapes)
 }
 

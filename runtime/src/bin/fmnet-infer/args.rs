@@ -70,8 +70,12 @@ pub(crate) struct ShapeArgs {
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
-    #[arg(long, value_name = "N|off", value_parser = decimation)]
-    pub(crate) decimate: Option<Decimation>,
+    #[arg(long, value_name = "N|off", value_parser = vertices)]
+    pub(crate) decimate: Option<Vertices>,
+    /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices [default:
+    /// 2000; off for features and for the refinements pmf and shared-triangulation]
+    #[arg(long, value_name = "N|off", value_parser = vertices)]
+    pub(crate) subdivide: Option<Vertices>,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
     #[arg(long, value_parser = radius)]
     pub(crate) shot_radius: Option<f64>,
@@ -248,15 +252,15 @@ pub(crate) struct InspectArgs {
     pub(crate) file: PathBuf,
 }
 
-/// `--decimate`: a number of vertices, or never.
+/// `--decimate` and `--subdivide`: a number of vertices, or never.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Decimation(pub(crate) Option<usize>);
+pub(crate) struct Vertices(pub(crate) Option<usize>);
 
-fn decimation(text: &str) -> Result<Decimation, String> {
+fn vertices(text: &str) -> Result<Vertices, String> {
     match text {
-        "off" => Ok(Decimation(None)),
+        "off" => Ok(Vertices(None)),
         _ => match text.parse() {
-            Ok(n) if n >= 100 => Ok(Decimation(Some(n))),
+            Ok(n) if n >= 100 => Ok(Vertices(Some(n))),
             _ => Err("expected a number of vertices, 100 or more, or `off`".into()),
         },
     }
@@ -291,7 +295,8 @@ impl ShapeArgs {
             backend: self.backend,
             k: self.k.map(usize::from),
             shot_radius: self.shot_radius,
-            decimate: self.decimate.map(|d| d.0),
+            decimate: self.decimate.map(|n| n.0),
+            subdivide: self.subdivide.map(|n| n.0),
             cache: self.cache.clone(),
             ..MatchOptions::default()
         }

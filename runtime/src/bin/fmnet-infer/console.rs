@@ -1,11 +1,12 @@
 //! What the program prints: progress on a terminal, plain lines elsewhere, a summary for scripts.
 
 use crate::args::Common;
+use fmnet::causes;
 use fmnet::events::Event;
-use fmnet::io::IoError;
+use fmnet::io::{IoError, print_error_line, print_line};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -67,7 +68,7 @@ impl Console {
 
     /// The error that ends the program.
     pub(crate) fn error(&self, error: &anyhow::Error) {
-        self.print(&format!("error: {}", causes(error)));
+        self.print(&format!("error: {}", causes(error.as_ref())));
     }
 
     /// The result: text for people, or the summary for scripts with the seconds of every stage added.
@@ -80,9 +81,9 @@ impl Console {
         if self.json {
             let stages = self.stages.lock().map(|s| s.clone()).unwrap_or_default();
             summary["stages"] = Value::Array(stages);
-            write_line(&format!("{summary:#}"))
+            print_line(&format!("{summary:#}"))
         } else if !self.quiet && !text.is_empty() {
-            write_line(text)
+            print_line(text)
         } else {
             Ok(())
         }
@@ -90,36 +91,10 @@ impl Console {
 
     fn print(&self, line: &str) {
         match &self.spinner {
-            Some(spinner) => spinner.suspend(|| write_error_line(line)),
-            None => write_error_line(line),
+            Some(spinner) => spinner.suspend(|| print_error_line(line)),
+            None => print_error_line(line),
         }
     }
-}
-
-/// An error with its causes, each once: the text of many holds that of their cause.
-pub(crate) fn causes(error: &anyhow::Error) -> String {
-    let mut text = error.to_string();
-    for cause in error.chain().skip(1).map(ToString::to_string) {
-        if !text.contains(&cause) {
-            text = format!("{text}: {cause}");
-        }
-    }
-    text
-}
-
-fn write_line(line: &str) -> Result<(), IoError> {
-    let mut out = std::io::stdout().lock();
-    match writeln!(out, "{line}").and_then(|()| out.flush()) {
-        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(IoError::Write { path: "standard output".into(), source })
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Nobody is left to be told that standard error cannot be written.
-fn write_error_line(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do without.
@@ -145,20 +120,6 @@ pub(crate) fn clean_up_on_interrupt() {
         std::process::exit(130);
     });
     if let Err(e) = installed {
-        write_error_line(&format!("warning: interrupts are not handled: {e}"));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use anyhow::Context;
-
-    #[test]
-    fn a_cause_is_said_once() {
-        let source = std::io::Error::other("no such file");
-        let error =
-            Err::<(), _>(IoError::Read { path: "a.off".into(), source }).context("--target").unwrap_err();
-        assert_eq!(causes(&error), "--target: cannot read a.off: no such file");
+        print_error_line(&format!("warning: interrupts are not handled: {e}"));
     }
 }

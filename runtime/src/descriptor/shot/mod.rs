@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn wider_registers_do_not_change_a_bit() {
         if !is_x86_feature_detected!("avx2") {
-            eprintln!("skipped: this processor has no AVX2");
+            crate::skip::skipped("this processor has no AVX2");
             return;
         }
         let mesh =

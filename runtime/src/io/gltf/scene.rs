@@ -179,10 +179,9 @@ impl<'a> Scene<'a> {
             let posed =
                 influences.as_ref().zip(skeleton).and_then(|(all, skeleton)| all.pose(i, position, skeleton));
             let place = posed.unwrap_or_else(|| matrix4::apply(&instance.world, position));
-            if !place.iter().all(|x| x.is_finite()) {
-                return Err(ParseError::part("scene", format!("vertex {i} is not finite: {place:?}")));
-            }
-            self.builder.vertices.push(place);
+            let problem = (!place.iter().all(|x| x.is_finite()))
+                .then(|| ParseError::part("scene", format!("vertex {i} is not finite: {place:?}")));
+            self.builder.vertex((place, problem));
         }
         self.vertex_colors(primitive, look, base, n)?;
         if let Some(accessor) = attribute(primitive, Semantic::TexCoords(look.uv_set)) {

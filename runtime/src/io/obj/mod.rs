@@ -148,7 +148,7 @@ impl Reader {
 
     /// `v x y z [w]`, `v x y z r g b` or `v x y z r g b a`.
     fn vertex(&mut self, mut words: Words<'_>) -> Parsed<()> {
-        self.builder.vertices.push(words.point("a coordinate")?);
+        self.builder.vertex(words.place("a coordinate")?);
         let mut rest = [1.0f32; 4];
         let mut n = 0;
         while let Some(word) = words.next().filter(|_| n < 4) {

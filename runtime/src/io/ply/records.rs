@@ -75,11 +75,11 @@ pub(super) fn read_vertices<S: Source>(
                 Slot::Skip => {}
             }
         }
-        if !position.iter().all(|x| x.is_finite()) {
+        let problem = (!position.iter().all(|x| x.is_finite())).then(|| {
             let problem = format!("the position is not finite: {position:?}");
-            return Err(source.error(problem).within(place(element, vertex)));
-        }
-        builder.vertices.push(position);
+            source.error(problem).within(place(element, vertex))
+        });
+        builder.vertex((position, problem));
         if let Some(colors) = &mut colors {
             colors.values.push(color);
         }

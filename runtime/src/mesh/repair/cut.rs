@@ -32,7 +32,12 @@ pub(super) fn cut_apart(mesh: &Mesh, welded: &[u32], kept: Vec<(u32, [u32; 3])>)
         let still_complex =
             if complex.is_empty() { BTreeSet::new() } else { still_complex(&topology, &faces) };
         if still_complex.is_empty() {
-            return Sheets { input_faces, faces, vertex_of_fan: fans.vertex_of_fan };
+            return Sheets {
+                input_faces,
+                faces,
+                vertex_of_fan: fans.vertex_of_fan,
+                dropped_faces: Vec::new(),
+            };
         }
         for edge in complex.iter_mut().filter(|edge| still_complex.contains(&edge.edge)) {
             edge.skip = if round < RETRIES { edge.skip + 1 } else { usize::MAX };

@@ -28,7 +28,7 @@ pub(super) fn proper_faces(mesh: &Mesh, welded: &[u32], report: &mut RepairRepor
 }
 
 /// The faces, ascending, whose vertices are those of an earlier one in whatever order.
-pub(in crate::mesh) fn repeated_faces(faces: &[(u32, [u32; 3])]) -> Vec<u32> {
+pub(crate) fn repeated_faces(faces: &[(u32, [u32; 3])]) -> Vec<u32> {
     let mut keyed: Vec<([u32; 3], u32)> = faces
         .iter()
         .map(|&(f, mut face)| {

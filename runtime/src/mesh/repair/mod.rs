@@ -2,8 +2,10 @@
 
 mod cut;
 mod faces;
-pub(super) use faces::repeated_faces;
-pub(crate) use faces::weld;
+pub(crate) use faces::repeated_faces;
+pub(super) use faces::weld;
+mod near;
+pub(crate) use near::weld_near;
 mod orient;
 
 use super::Mesh;
@@ -16,16 +18,17 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RepairOptions {
-    /// Take vertices at identical positions as one where their faces fit together. Default true.
+    /// Take vertices at one position, or on a boundary and 1e-5 of the bounding box's diagonal apart, as one where their
+    /// faces fit together. Default true.
     pub weld: bool,
     /// Drop connected components whose area is below this share of the largest component's. Range 0 (keep all) to 1,
-    /// default 1e-3: below that a component is debris of the scanner, with too few vertices for a descriptor.
+    /// default 0.01: such are buttons, teeth, eyes and debris of the scanner. Each would take an eigenfunction from the body.
     pub min_component_area: f64,
 }
 
 impl Default for RepairOptions {
     fn default() -> Self {
-        Self { weld: true, min_component_area: 1e-3 }
+        Self { weld: true, min_component_area: 0.01 }
     }
 }
 
@@ -34,11 +37,13 @@ impl Default for RepairOptions {
 pub struct Repaired {
     /// An oriented manifold with boundary: each edge has one or two faces, each vertex one fan of faces and at least one.
     pub mesh: Mesh,
-    /// For every input vertex its vertex in `mesh`, `[n_input]`. `None`: it has no counterpart and cannot be matched,
+    /// For every input vertex its vertex in `mesh`, at its position or near it, `[n_input]`. `None`: it has no counterpart,
     /// as no face that remains has a vertex there.
     pub repaired_of_input: Vec<Option<u32>>,
     /// For every vertex of `mesh` an input vertex at the same position, `[n_repaired]`.
     pub input_of_repaired: Vec<u32>,
+    /// Input vertices without counterpart whose faces went with a tiny component, ascending.
+    pub dropped_vertices: Vec<u32>,
     /// What was done.
     pub report: RepairReport,
 }
@@ -46,7 +51,7 @@ pub struct Repaired {
 /// What [`repair`](repair()) did, by counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RepairReport {
-    /// Input vertices joined to another one at the same position.
+    /// Input vertices joined to another one at the same position or near it.
     pub welded_vertices: usize,
     /// Faces dropped as they repeat a vertex or have no area.
     pub degenerate_faces: usize,
@@ -60,6 +65,8 @@ pub struct RepairReport {
     pub unorientable_edges: usize,
     /// Components dropped for their size.
     pub dropped_components: usize,
+    /// Input vertices of those, which follow the nearest vertex that remains.
+    pub dropped_vertices: usize,
     /// Input vertices without counterpart: of no face, or only of faces that were dropped.
     pub unmatched_vertices: usize,
 }
@@ -80,7 +87,8 @@ impl fmt::Display for RepairReport {
             (self.cut_vertices, "vertices added to cut non-manifold places apart"),
             (self.flipped_faces, "faces turned round"),
             (self.unorientable_edges, "edges left that cannot be oriented"),
-            (self.dropped_components, "tiny components dropped"),
+            (self.dropped_components, "tiny components left out"),
+            (self.dropped_vertices, "vertices of those follow the nearest of the rest"),
             (self.unmatched_vertices, "vertices left without a match"),
         ];
         let done: Vec<String> =
@@ -123,12 +131,12 @@ pub enum RepairError {
 
 /// Makes an oriented manifold with boundary of any mesh.
 ///
-/// In order: vertices at identical positions are taken as one; faces without area and repeated faces go; sheets that
+/// In order: vertices at identical positions, and near ones on a boundary, are taken as one; faces without area and repeated faces go; sheets that
 /// meet in a non-manifold edge or vertex are cut apart there, each with a copy of the vertices; components that are tiny
 /// and vertices without a face go; faces are turned round to agree with their neighbours, and so that a closed surface
 /// has its normals outside.
 ///
-/// Vertices are welded per fan: two vertices at one position become one only where edges join their faces around that
+/// Vertices are welded per fan: two vertices at one place become one only where edges join their faces around that
 /// position. Surfaces that merely touch stay apart, and a mesh in which nothing is wrong comes back bit for bit with the
 /// identity as its map.
 ///
@@ -145,7 +153,7 @@ pub fn repair(mesh: &Mesh, options: &RepairOptions) -> Result<Repaired, RepairEr
         return Err(RepairError::NoFaces { n_vertices: mesh.n_vertices() });
     }
     let mut report = RepairReport::default();
-    let welded = if options.weld { faces::weld(mesh) } else { (0..mesh.n_vertices() as u32).collect() };
+    let welded = if options.weld { weld_near(mesh) } else { (0..mesh.n_vertices() as u32).collect() };
     let kept = faces::proper_faces(mesh, &welded, &mut report);
     if kept.is_empty() {
         let corners = mesh.corners(0);
@@ -165,6 +173,8 @@ struct Sheets {
     faces: Vec<[u32; 3]>,
     /// The welded vertex of each fan, ascending.
     vertex_of_fan: Vec<u32>,
+    /// The input faces of dropped components.
+    dropped_faces: Vec<u32>,
 }
 
 impl Sheets {
@@ -190,6 +200,8 @@ fn drop_tiny_components(mesh: &Mesh, sheets: &mut Sheets, min_area: f64, report:
         let keep: Vec<bool> = sheets.faces.iter().map(|face| areas[component_of(face)] >= limit).collect();
         let mut kept = keep.iter();
         sheets.faces.retain(|_| *kept.next().expect("one flag per face"));
+        let dropped = sheets.input_faces.iter().zip(&keep).filter(|(_, keep)| !**keep);
+        sheets.dropped_faces = dropped.map(|(&face, _)| face).collect();
         let mut kept = keep.iter();
         sheets.input_faces.retain(|_| *kept.next().expect("one flag per face"));
     }
@@ -225,13 +237,32 @@ fn assemble(
     let fan_of_input = largest_fans(mesh, welded, sheets);
     let repaired_of_input: Vec<Option<u32>> =
         fan_of_input.iter().map(|&fan| (fan != NONE).then(|| repaired_of_fan[fan as usize])).collect();
-    report.unmatched_vertices = repaired_of_input.iter().filter(|r| r.is_none()).count();
+    let dropped_vertices = dropped_vertices(mesh, welded, &sheets.dropped_faces, &repaired_of_input);
+    report.dropped_vertices = dropped_vertices.len();
+    report.unmatched_vertices =
+        repaired_of_input.iter().filter(|r| r.is_none()).count() - dropped_vertices.len();
     let mut is_image = vec![false; input_of_repaired.len()];
     repaired_of_input.iter().flatten().for_each(|&r| is_image[r as usize] = true);
     let n_images = is_image.iter().filter(|&&i| i).count();
     report.cut_vertices = input_of_repaired.len() - n_images;
-    report.welded_vertices = mesh.n_vertices() - report.unmatched_vertices - n_images;
-    Repaired { mesh: mesh_out, repaired_of_input, input_of_repaired, report }
+    report.welded_vertices =
+        mesh.n_vertices() - report.unmatched_vertices - report.dropped_vertices - n_images;
+    Repaired { mesh: mesh_out, repaired_of_input, input_of_repaired, dropped_vertices, report }
+}
+
+/// The vertices without counterpart at the places of dropped faces.
+fn dropped_vertices(
+    mesh: &Mesh,
+    welded: &[u32],
+    dropped_faces: &[u32],
+    repaired_of_input: &[Option<u32>],
+) -> Vec<u32> {
+    let mut is_dropped = vec![false; mesh.n_vertices()];
+    for &face in dropped_faces {
+        mesh.faces()[face as usize].iter().for_each(|&v| is_dropped[welded[v as usize] as usize] = true);
+    }
+    let lost = |&v: &u32| repaired_of_input[v as usize].is_none() && is_dropped[welded[v as usize] as usize];
+    (0..mesh.n_vertices() as u32).filter(lost).collect()
 }
 
 /// For every input vertex the fan with the largest area among those its own corners are in, else among all at its

@@ -178,7 +178,7 @@ fn a_moebius_strip_is_left_with_a_seam() {
 }
 
 #[test]
-fn tiny_components_go_and_their_vertices_are_unmatched() {
+fn tiny_components_go_and_their_vertices_are_named() {
     let sphere = shapes::icosphere(2);
     let crumb = shapes::transformed(
         &shapes::icosphere(0),
@@ -189,7 +189,8 @@ fn tiny_components_go_and_their_vertices_are_unmatched() {
     let mesh = shapes::joined(&[&crumb, &sphere]);
     let result = repaired(&mesh);
     assert_eq!(result.mesh, sphere);
-    assert_eq!((result.report.dropped_components, result.report.unmatched_vertices), (1, 12));
+    assert_eq!((result.report.dropped_components, result.report.dropped_vertices), (1, 12));
+    assert_eq!((result.report.unmatched_vertices, result.dropped_vertices), (0, (0..12).collect()));
     let keep_all = RepairOptions { min_component_area: 0.0, ..RepairOptions::default() };
     assert_eq!(repair(&mesh, &keep_all).unwrap().mesh, mesh);
 }

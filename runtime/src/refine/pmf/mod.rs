@@ -62,6 +62,9 @@ pub struct PmfOptions {
     /// is the result, exact whatever the shapes; it comes from the triangulation and says nothing about the filter. Range 0
     /// to 1, default 0.95.
     pub alike: f64,
+    /// The source is a part of the target, in one unit: times are then relative to the area of the target for both. Default
+    /// false: to the area of each.
+    pub part: bool,
 }
 
 impl Default for PmfOptions {
@@ -76,6 +79,7 @@ impl Default for PmfOptions {
             candidates: 128,
             descriptor_weight: 0.5,
             alike: 0.95,
+            part: false,
         }
     }
 }
@@ -131,8 +135,9 @@ pub fn pmf(
     if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
         return Err(RefineError::NothingMatched);
     }
-    let source = Embedding::new(basis_source, options.time_end, options.neighbors_start);
-    let target = Embedding::new(basis_target, options.time_end, options.candidates);
+    let areas = [if options.part { basis_target.area() } else { basis_source.area() }, basis_target.area()];
+    let source = Embedding::new(basis_source, options.time_end * areas[0], options.neighbors_start);
+    let target = Embedding::new(basis_target, options.time_end * areas[1], options.candidates);
     let term = || {
         hints.descriptors.map(|d| DescriptorTerm::new(d, &target.neighborhoods, options.descriptor_weight))
     };
@@ -140,8 +145,8 @@ pub fn pmf(
     let mut filter =
         Filter { targets: map.targets.clone(), averages: Matrix::default(), changed: Vec::new() };
     for time in log_steps(options.time_start, options.time_end, options.heat_rounds) {
-        filter.averages = heat_average(&filter.targets, basis_source, basis_target, time)?;
-        let blurred = scaled(&basis_target.eigenvectors, &decay(basis_target, time));
+        filter.averages = heat_average(&filter.targets, basis_source, basis_target, time * areas[0])?;
+        let blurred = scaled(&basis_target.eigenvectors, &decay(basis_target, time * areas[1]));
         filter.assign(&Assigner::new(&blurred, &target.neighborhoods, options.candidates, term()), around);
     }
     let assigner = Assigner::new(&target.rows, &target.neighborhoods, options.candidates, term());
@@ -233,10 +238,9 @@ fn scaled(matrix: &Matrix, factors: &[f64]) -> Matrix {
     Matrix::from_fn(matrix.rows(), matrix.cols(), |i, j| matrix[(i, j)] * factors[j])
 }
 
-/// `exp(-t lambda)` of each eigenvalue, with `t` relative to the area.
+/// `exp(-t lambda)` of each eigenvalue.
 fn decay(basis: &Eigenbasis, time: f64) -> Vec<f64> {
-    let area: f64 = basis.mass.iter().sum();
-    basis.eigenvalues.iter().map(|lambda| (-time * lambda * area).exp()).collect()
+    basis.eigenvalues.iter().map(|lambda| (-time * lambda).exp()).collect()
 }
 
 /// `count` numbers from `from` to `to` in even steps of the logarithm; only `to`, if it is one.

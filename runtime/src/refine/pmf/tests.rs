@@ -259,3 +259,31 @@ fn thread_count_does_not_matter() {
     };
     assert!(run(1) == run(3));
 }
+
+/// A part of a bumpy sphere in the unit of the whole: its heat kernels are as wide as those of the whole, in lengths.
+#[test]
+fn a_part_and_its_whole_are_in_one_unit() {
+    let whole = bumpy_sphere(3, 5);
+    let is_kept = |v: usize| whole.vertices()[v][2] > 0.0;
+    let kept: Vec<u32> = (0..whole.n_vertices() as u32).filter(|&v| is_kept(v as usize)).collect();
+    let place = |v: u32| kept.binary_search(&v).map(|at| at as u32);
+    let face = |face: &[u32; 3]| -> Option<[u32; 3]> {
+        Some([place(face[0]).ok()?, place(face[1]).ok()?, place(face[2]).ok()?])
+    };
+    let vertices = kept.iter().map(|&v| whole.vertices()[v as usize]).collect();
+    let part = crate::Mesh::new(vertices, whole.faces().iter().filter_map(face).collect()).unwrap();
+    let basis = |mesh: &crate::Mesh, k, unit: f64| {
+        let (basis, _) = eigenbasis(&Laplacian::new(mesh), k, &EigenOptions::default()).unwrap();
+        basis.in_unit(unit, k)
+    };
+    let start = corrupted(&kept, whole.n_vertices());
+    let options = PmfOptions { part: true, ..coarse() };
+    let refined = |unit: f64| {
+        let (part, whole) = (basis(&part, 60, unit), basis(&whole, 120, unit));
+        pmf(&start, &part, &whole, PmfHints::default(), &options).unwrap().map
+    };
+    let (one, other) = (refined(whole.area()), refined(3.0 * whole.area()));
+    assert!(share_of(&one, &kept) > 0.8, "{}", share_of(&one, &kept));
+    // The unit of both together does not matter.
+    assert!(share_of(&one, &other.targets) > 0.99, "{}", share_of(&one, &other.targets));
+}

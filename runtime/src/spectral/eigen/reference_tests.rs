@@ -34,7 +34,7 @@ fn eigenvalues_and_mass_agree_with_scipy() {
         let npz = reference.join(format!("{name}_spectrum_geodesics.npz"));
         let mesh = data.join(mesh);
         if !(npz.exists() && mesh.exists()) {
-            eprintln!("skipped: {} or {} is absent", npz.display(), mesh.display());
+            crate::skip::skipped(format!("{} or {} is absent", npz.display(), mesh.display()));
             continue;
         }
         let (mass, eigenvalues) = (array(&npz, "mass"), array(&npz, "eigenvalues"));

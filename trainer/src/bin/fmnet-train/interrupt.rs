@@ -33,6 +33,6 @@ pub(crate) fn watch(stop_in_order: bool) {
         }
     });
     if let Err(e) = installed {
-        eprintln!("warning: interrupts are not handled: {e}");
+        fmnet::io::print_error_line(&format!("warning: interrupts are not handled: {e}"));
     }
 }

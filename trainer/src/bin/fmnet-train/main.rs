@@ -8,7 +8,8 @@ mod progress;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
-use fmnet::io::IoError;
+use fmnet::causes;
+use fmnet::io::{IoError, print_error_line};
 use fmnet_trainer::checkpoint::CheckpointError;
 use fmnet_trainer::export::ExportError;
 use fmnet_trainer::precompute::PrepareError;
@@ -27,7 +28,7 @@ fn main() -> ExitCode {
     if let Some(threads) = cli.common.threads
         && let Err(e) = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()
     {
-        eprintln!("warning: --threads {threads}: {e}");
+        print_error_line(&format!("warning: --threads {threads}: {e}"));
     }
     interrupt::watch(matches!(cli.command, Command::Train(_) | Command::Reproduce(_)));
     let outcome = match cli.command {
@@ -43,7 +44,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            print_error_line(&format!("error: {}", causes(error.as_ref())));
             ExitCode::from(match error.downcast_ref() {
                 Some(ReproduceError::Stopped(_)) => interrupt::INTERRUPTED,
                 _ if is_own_failure(&error) => 1,

@@ -2,9 +2,12 @@
 
 use crate::args::Common;
 use fmnet::events::Event;
+use fmnet::io::{IoError, print_error_line, print_line};
 use fmnet_trainer::events::TrainEvent;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::Value;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -141,8 +144,18 @@ impl Progress {
 
     fn print(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{line}")),
-            None => eprintln!("{line}"),
+            Some(bar) => bar.suspend(|| print_error_line(line)),
+            None => print_error_line(line),
         }
     }
+}
+
+/// The summary for scripts.
+pub(crate) fn print_summary(summary: &Value) -> Result<(), IoError> {
+    print_line(&format!("{summary:#}"))
+}
+
+/// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do without.
+pub(crate) fn shown(path: &Path) -> String {
+    path.display().to_string()
 }

@@ -5,12 +5,12 @@ use super::matching::{quality, read};
 use super::output::{Inputs, create_folder, file_name};
 use super::pairs::{Pair, read_pairs};
 use crate::args::BatchArgs;
-use crate::console::{Console, causes, shown};
+use crate::console::{Console, shown};
 use anyhow::{Result, bail};
+use fmnet::causes;
 use fmnet::io::write_point_map;
 use fmnet::pipeline::{DescribedShape, Match, MatchOptions, Matcher};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     let matcher = Matcher::new(&MatchOptions { cache: Some(cache), ..options.clone() })?;
     check_outputs(args, &pairs)?;
     let mut keys = MapKeys::new(&matcher, &options, args.partial);
-    let mut shapes = Shapes { matcher: &matcher, kept: BTreeMap::new(), order: Vec::new() };
+    let mut shapes = Shapes { matcher: &matcher, kept: Vec::new() };
     let (mut done, mut renewed, mut skipped, mut failures) = (0, 0, 0, Vec::new());
     let (mut maps, mut doubtful) = (Vec::new(), 0);
     for (number, pair) in pairs.iter().enumerate() {
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
                                   "map": shown(&pair.out), "quality": quality }));
             }
             Err(error) => {
-                let error = causes(&error);
+                let error = causes(error.as_ref());
                 console.warn(&format!("{place}: {error}"));
                 let (source, target) = (shown(&pair.source), shown(&pair.target));
                 failures.push(json!({ "source": source, "target": target, "error": error }));
@@ -115,11 +115,10 @@ fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, consol
 /// A shape's file and, where it is a part, the bits of the area of the whole.
 type ShapeKey = (PathBuf, Option<u64>);
 
-/// The shapes used last.
+/// The shapes used last, the latest at the end.
 struct Shapes<'a> {
     matcher: &'a Matcher,
-    kept: BTreeMap<ShapeKey, Arc<DescribedShape>>,
-    order: Vec<ShapeKey>,
+    kept: Vec<(ShapeKey, Arc<DescribedShape>)>,
 }
 
 impl Shapes<'_> {
@@ -131,10 +130,10 @@ impl Shapes<'_> {
         console: &Console,
     ) -> Result<Arc<DescribedShape>> {
         let key = (path.to_path_buf(), whole_area.map(f64::to_bits));
-        self.order.retain(|other| *other != key);
-        self.order.push(key.clone());
-        if let Some(shape) = self.kept.get(&key) {
-            return Ok(shape.clone());
+        if let Some(at) = self.kept.iter().position(|(other, _)| *other == key) {
+            let (key, shape) = self.kept.remove(at);
+            self.kept.push((key, shape.clone()));
+            return Ok(shape);
         }
         let (mesh, name) = (read(path, console)?.mesh, file_name(path));
         let observer = |event| console.event(event);
@@ -142,11 +141,38 @@ impl Shapes<'_> {
             Some(area) => self.matcher.describe_part(&name, &mesh, area, &observer)?,
             None => self.matcher.describe(&name, &mesh, &observer)?,
         });
-        if self.kept.len() == KEPT_SHAPES {
-            let oldest = self.order.remove(0);
-            self.kept.remove(&oldest);
+        self.kept.push((key, shape.clone()));
+        if self.kept.len() > KEPT_SHAPES {
+            self.kept.remove(0);
         }
-        self.kept.insert(key, shape.clone());
         Ok(shape)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::Common;
+    use fmnet::io::{Attributes, write_mesh};
+    use fmnet::mesh::shapes::bumpy_sphere;
+    use fmnet::pipeline::DescriptorKind;
+
+    #[test]
+    fn shapes_that_fail_do_not_make_the_store_grow() {
+        let folder = tempfile::tempdir().unwrap();
+        let (descriptor, k) = (DescriptorKind::Shot, Some(8));
+        let options = MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() };
+        let matcher = Matcher::new(&options).unwrap();
+        let console = Console::new(&Common { threads: None, quiet: true, json: false });
+        let mut shapes = Shapes { matcher: &matcher, kept: Vec::new() };
+        std::fs::write(folder.path().join("bad.off"), "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n").unwrap();
+        for seed in 0..3 * KEPT_SHAPES as u64 {
+            let path = folder.path().join(format!("s{seed}.off"));
+            write_mesh(&path, &bumpy_sphere(1, seed), &Attributes::default()).unwrap();
+            assert!(shapes.get(&folder.path().join("bad.off"), None, &console).is_err());
+            let shape = shapes.get(&path, None, &console).unwrap();
+            assert!(Arc::ptr_eq(&shape, &shapes.get(&path, None, &console).unwrap()), "it is kept");
+            assert!(shapes.kept.len() <= KEPT_SHAPES);
+        }
     }
 }

@@ -28,11 +28,9 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<()> {
     let target = decode_mesh(BODIES[1], Path::new("target.ply"))?.mesh;
     let matcher = Matcher::new(&MatchOptions::default())?;
     let match_start = Instant::now();
-    let (described_source, described_target) = rayon::join(
-        || matcher.describe("source", &source, &observer),
-        || matcher.describe("target", &target, &observer),
-    );
-    let result = matcher.match_shapes(&described_source?, &described_target?, &observer)?;
+    let [described_source, described_target] =
+        matcher.describe_pair(("source", &source), ("target", &target), false, &observer)?;
+    let result = matcher.match_shapes(&described_source, &described_target, &observer)?;
     let match_seconds = match_start.elapsed().as_secs_f64();
     let pairs = (0..CORRESPONDING).map(|i| (i, i)).collect();
     let truth = GroundTruth::new(pairs, source.n_vertices(), target.n_vertices())?;

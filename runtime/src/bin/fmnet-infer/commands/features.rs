@@ -17,7 +17,10 @@ use std::path::{Path, PathBuf};
 const FILES: [&str; 2] = ["descriptors.npy", "vertices.npy"];
 
 pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
-    let matcher = Matcher::new(&args.shape.to_options())?;
+    let mut options = args.shape.to_options();
+    // A row for each vertex of the file, unless more are asked for.
+    options.subdivide = options.subdivide.or(Some(None));
+    let matcher = Matcher::new(&options)?;
     let observer = |event| console.event(event);
     let file = read(&args.mesh, console)?;
     check_outputs(args, &file)?;

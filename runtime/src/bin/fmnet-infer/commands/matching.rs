@@ -25,14 +25,8 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     inputs.check(&outputs)?;
     let (source, target) = (source.mesh, target.mesh);
     let (name_source, name_target) = (file_name(&args.source), file_name(&args.target));
-    let (described_source, described_target) = rayon::join(
-        || match args.partial {
-            true => matcher.describe_part(&name_source, &source, target.area(), &observer),
-            false => matcher.describe(&name_source, &source, &observer),
-        },
-        || matcher.describe(&name_target, &target, &observer),
-    );
-    let (described_source, described_target) = (described_source?, described_target?);
+    let [described_source, described_target] =
+        matcher.describe_pair((&name_source, &source), (&name_target, &target), args.partial, &observer)?;
     let result =
         matcher.match_with_landmarks(&described_source, &described_target, &landmarks, &observer)?;
     let text = summary_text(&result, start.elapsed().as_secs_f64());
@@ -61,7 +55,9 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
 
 /// A map that `--strict` does not let pass.
 #[derive(Debug, thiserror::Error)]
-#[error("the map is doubtful, expected mean error {expected_error:.1} % of sqrt(area) (--strict); it was written")]
+#[error(
+    "the map is doubtful, expected mean error {expected_error:.1} % of sqrt(area) (--strict); it was written"
+)]
 pub(crate) struct Doubtful {
     expected_error: f64,
 }

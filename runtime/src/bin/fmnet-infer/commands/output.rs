@@ -173,7 +173,8 @@ pub(crate) fn write(path: &Path, output: &MapOutput) -> Result<()> {
                 target: output.target,
                 map: output.map,
                 caption: output.caption,
-            });
+            })
+            .with_context(|| path.display().to_string())?;
             write_atomically(path, |out| out.write_all(page.as_bytes()))?;
         }
     }

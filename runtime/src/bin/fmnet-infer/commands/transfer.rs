@@ -38,7 +38,7 @@ pub(crate) fn run(args: &TransferArgs, console: &Console) -> Result<()> {
     let (giver, receiver, donors) = match args.to {
         Receiver::Source => ((&*args.target, &target), (&*args.source, &source), Donors::of_source(&map)),
         Receiver::Target => {
-            ((&*args.source, &source), (&*args.target, &target), Donors::of_target(&map, &target.mesh))
+            ((&*args.source, &source), (&*args.target, &target), Donors::of_target(&map, &target.mesh)?)
         }
     };
     let known = args.to == Receiver::Source && map.points.is_some();

@@ -1,7 +1,7 @@
 //! `fmnet-train calibrate`.
 
 use crate::args::{CalibrateArgs, Common};
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary};
 use anyhow::Result;
 use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::io::write_atomically;
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &CalibrateArgs, common: &Common) -> Result<()> {
     if common.json {
         let summary = json!({ "calibration": calibration, "maps": maps.len(), "bad": bad, "found": found, "good": good,
                               "false_alarms": alarms });
-        println!("{summary:#}");
+        print_summary(&summary)?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `fmnet-train evaluate`.
 
 use crate::args::{Common, EvaluateArgs};
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::{Context, Result, bail};
 use fmnet::eval::{ErrorCurve, curves_from_csv};
 use fmnet::fmap::FmapSolver;
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &EvaluateArgs, common: &Common) -> Result<()> {
     progress.say(&format!("report: {}", args.out.join("report.html").display()));
     if common.json {
         let records: Vec<Value> = results.iter().map(record).collect();
-        println!("{:#}", json!({ "dataset": args.dataset, "pairs": pairs.len(), "methods": records }));
+        print_summary(&json!({ "dataset": shown(&args.dataset), "pairs": pairs.len(), "methods": records }))?;
     }
     Ok(())
 }

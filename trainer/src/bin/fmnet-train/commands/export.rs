@@ -1,8 +1,10 @@
 //! `fmnet-train export`.
 
 use crate::args::{Common, ExportArgs};
+use crate::progress::{print_summary, shown};
 use anyhow::{Context, Result, anyhow, bail};
 use candle_core::Device;
+use fmnet::io::print_error_line;
 use fmnet::quality::Calibration;
 use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::export::{ModelOrigin, export, metadata};
@@ -28,10 +30,17 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
     }
     export(checkpoint.network(&Device::Cpu)?.as_ref(), &metadata, &args.output)?;
     if !common.quiet {
-        eprintln!("{} -> {} ({} minibatches)", path.display(), args.output.display(), checkpoint.step);
+        print_error_line(&format!(
+            "{} -> {} ({} minibatches)",
+            path.display(),
+            args.output.display(),
+            checkpoint.step
+        ));
     }
     if common.json {
-        println!("{:#}", json!({ "checkpoint": path, "model": args.output, "metadata": metadata }));
+        print_summary(
+            &json!({ "checkpoint": shown(&path), "model": shown(&args.output), "metadata": metadata }),
+        )?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `fmnet-train preprocess`.
 
 use crate::args::{Common, PreprocessArgs};
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::Result;
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::dataset::Split;
@@ -22,7 +22,7 @@ pub(crate) fn run(args: &PreprocessArgs, common: &Common) -> Result<()> {
     progress.say(&format!("{} shapes are ready in {}", shapes.len(), args.cache.display()));
     if common.json {
         let names: Vec<&str> = shapes.iter().map(|s| s.entry.name.as_str()).collect();
-        println!("{:#}", json!({ "cache": args.cache, "shapes": names }));
+        print_summary(&json!({ "cache": shown(&args.cache), "shapes": names }))?;
     }
     Ok(())
 }

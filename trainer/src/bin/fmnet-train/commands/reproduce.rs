@@ -3,7 +3,7 @@
 use super::train::device;
 use crate::args::{Common, ReproduceArgs};
 use crate::interrupt;
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::{Context, Result};
 use fmnet::events::Event;
 use fmnet_trainer::reproduce::{Observers, Settings, experiment, run as run_experiment};
@@ -28,7 +28,7 @@ pub(crate) fn run(args: &ReproduceArgs, common: &Common) -> Result<()> {
     let report = run_experiment(&experiment, &settings, &device(args.cuda)?, observers, interrupt::stop())?;
     progress.say(&format!("report: {}", report.display()));
     if common.json {
-        println!("{:#}", json!({ "experiment": experiment.name, "report": report }));
+        print_summary(&json!({ "experiment": experiment.name, "report": shown(&report) }))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `fmnet-train simulate`.
 
 use crate::args::{Common, SimulateArgs, Simulated};
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::Result;
 use fmnet_trainer::dataset::Dataset;
 use fmnet_trainer::events::TrainEvent;
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &SimulateArgs, common: &Common) -> Result<()> {
     };
     progress.say(&format!("{count} {what} in {}", out.display()));
     if common.json {
-        println!("{:#}", json!({ "folder": out, what: count }));
+        print_summary(&json!({ "folder": shown(out), what: count }))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `fmnet-train synth`.
 
 use crate::args::{Common, SynthArgs};
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::{Result, bail};
 use fmnet_trainer::events::TrainEvent;
 use fmnet_trainer::synth::{
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &SynthArgs, common: &Common) -> Result<()> {
         args.folder.display()
     ));
     if common.json {
-        println!("{:#}", json!({ "folder": args.folder, "shapes": shapes }));
+        print_summary(&json!({ "folder": shown(&args.folder), "shapes": shapes }))?;
     }
     Ok(())
 }

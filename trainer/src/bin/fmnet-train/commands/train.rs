@@ -2,7 +2,7 @@
 
 use crate::args::{Common, TrainArgs};
 use crate::interrupt;
-use crate::progress::Progress;
+use crate::progress::{Progress, print_summary, shown};
 use anyhow::{Context, Result, bail};
 use candle_core::Device;
 use fmnet_trainer::config::TrainConfig;
@@ -27,10 +27,9 @@ pub(crate) fn run(args: TrainArgs, common: &Common) -> Result<()> {
     }
     if common.json {
         let best = summary.best_error.is_finite().then_some(summary.best_error);
-        println!(
-            "{:#}",
-            json!({ "out": config.out, "step": summary.step, "stopped": summary.stopped, "best_error": best })
-        );
+        print_summary(
+            &json!({ "out": shown(&config.out), "step": summary.step, "stopped": summary.stopped, "best_error": best }),
+        )?;
     }
     Ok(())
 }
