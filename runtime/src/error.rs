@@ -60,6 +60,14 @@ pub enum Error {
         /// The area given.
         area: f64,
     },
+    /// A shape was described by another matcher's model, back-end or settings of SHOT.
+    #[error(
+        "{shape} was described by another model or other settings of SHOT than those of this matcher; describe it again by this matcher"
+    )]
+    OtherDescriptor {
+        /// The name of the shape.
+        shape: String,
+    },
     /// Any of these, on a known shape or pair.
     #[error("{shape}: {source}")]
     InShape {

@@ -6,6 +6,7 @@
 //! not compute SHOT anew, and a model that takes no SHOT never computes it.
 
 pub mod quantities;
+mod saved;
 mod way_back;
 
 use crate::cache::{Cache, CacheKey, Decoder, Encoder};
