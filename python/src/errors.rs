@@ -1,6 +1,7 @@
 //! Errors and warnings as Python knows them: what the system refused is an `OSError`, everything else `fmnet.Error`, a `ValueError`.
 
 use fmnet::io::IoError;
+use fmnet::network::NetworkError;
 use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use std::path::Path;
@@ -43,6 +44,10 @@ impl From<Failure> for PyErr {
 fn of_library(error: &fmnet::Error) -> PyErr {
     match innermost(error) {
         fmnet::Error::Io(io) => of_io(io).unwrap_or_else(|| Error::new_err(error.to_string())),
+        fmnet::Error::Network(NetworkError::Read { path, .. }) => match std::fs::metadata(path) {
+            Err(source) => system_error(path, &source),
+            Ok(_) => PyOSError::new_err(error.to_string()),
+        },
         _ => Error::new_err(error.to_string()),
     }
 }

@@ -62,7 +62,7 @@ def test_files(mesh, tmp_path):
     (tmp_path / "bad.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n")
     with pytest.raises(fmnet.Error, match="bad.off, line"):
         fmnet.match(tmp_path / "bad.off", mesh, **SHOT)
-    with pytest.raises(OSError, match="none.onnx"):
+    with pytest.raises(FileNotFoundError, match="none.onnx"):
         fmnet.Matcher(tmp_path / "none.onnx")
     (tmp_path / "bad.onnx").write_bytes(b"nothing")
     with pytest.raises(fmnet.Error, match="bad.onnx"):
@@ -75,13 +75,14 @@ def test_files(mesh, tmp_path):
 
 
 def test_warnings_are_warnings_of_python(mesh):
-    vertices, faces = mesh
-    with pytest.warns(fmnet.FmnetWarning, match="vertices have too few neighbours"):
-        fmnet.match(mesh, mesh, shot_radius=0.01, **SHOT)
+    matcher = fmnet.Matcher(shot_radius=0.01, **SHOT)
+    with pytest.warns(fmnet.FmnetWarning, match="mesh: 642 of 642 vertices have too few neighbours") as caught:
+        matcher.describe(mesh)
+    assert caught[0].filename == __file__
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(fmnet.FmnetWarning, match="too few neighbours"):
-            fmnet.match(mesh, mesh, shot_radius=0.01, **SHOT)
+            matcher.describe(mesh)
 
 
 def test_warnings_of_a_file(mesh, tmp_path):
