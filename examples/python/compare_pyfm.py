@@ -4,8 +4,8 @@
     python compare_pyfm.py registrations --pairs 8
 
 The folder has meshes of one numbering, such as the FAUST registrations: vertex i of one corresponds with vertex i of the other.
-pyFM is run as its tutorial does (150 eigenfunctions, wave kernel signatures with 5 landmarks, its fit, ICP, ZoomOut); the landmarks
-are taken from the ground truth, which fmnet is not given.
+pyFM (1.3 or newer) is run as its tutorial does: wave kernel signatures with 5 landmarks, its fit, ICP, ZoomOut. The landmarks are taken
+from the ground truth, which fmnet is not given.
 """
 
 import argparse
@@ -28,14 +28,13 @@ def by_fmnet(matcher, source, target):
 
 def by_pyfm(source, target):
     """pyFM gives for each vertex of its second mesh one of its first."""
-    meshes = [TriMesh(str(path), area_normalize=True).process(k=150, intrinsic=True) for path in (target, source)]
+    meshes = [TriMesh.load(str(path), area_normalize=True) for path in (target, source)]
     model = FunctionalMapping(*meshes)
     landmarks = np.linspace(0, len(meshes[0].vertices) - 1, 5).astype(int)
-    model.preprocess(n_ev=(50, 50), n_descr=100, descr_type="WKS", subsample_step=5, landmarks=landmarks)
-    model.fit(w_descr=1e0, w_lap=1e-2, w_dcomm=1e-1, w_orient=0)
-    model.icp_refine()
-    model.zoomout_refine(nit=15, step=5)
-    return model.get_p2p()
+    model.preprocess(n_descr=100, descr_type="WKS", subsample_step=5, landmarks=landmarks, k_process=150)
+    model.fit(K=(50, 50), w_descr=1e0, w_lap=1e-2, w_dcomm=1e-1, w_orient=0)
+    functional_map = model.zoomout_refine(model.icp_refine(), nit=15, step=5)
+    return model.get_p2p(functional_map)
 
 
 def main():

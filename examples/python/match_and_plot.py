@@ -24,10 +24,14 @@ def colors_of(vertices):
 
 def draw(axes, vertices, faces, colors, title):
     """Draws a mesh of coloured triangles, seen from the front (z towards the viewer, y up)."""
-    drawing = axes.plot_trisurf(vertices[:, 0], -vertices[:, 2], vertices[:, 1], triangles=faces, shade=False)
-    drawing.set_facecolor(colors[faces].mean(axis=1))
+    x, y, z = vertices[:, 0], -vertices[:, 2], vertices[:, 1]
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normals = np.cross(b - a, c - a)
+    facing = np.abs(normals[:, 2]) / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
+    drawing = axes.plot_trisurf(x, y, z, triangles=faces, shade=False)
+    drawing.set_facecolor(colors[faces].mean(axis=1) * (0.4 + 0.6 * facing)[:, None])
     axes.set_title(title)
-    axes.set_aspect("equal")
+    axes.set_box_aspect(np.ptp([x, y, z], axis=1), zoom=1.6)
     axes.set_axis_off()
     axes.view_init(elev=0, azim=-90)
 

@@ -5,7 +5,7 @@
 
 Every worker loads the model once, and every shape is described once, wherever it is needed. A map that is there is kept where both
 meshes, the model and every option are the same as then, else made anew: either program goes on where the other was stopped.
-A pair whose worker dies is tried once more. On a cluster that is up (`ray start`), the folders have to be shared by its machines.
+A pair whose worker dies is run again, by the worker that takes its place. On a cluster that is up (`ray start`), the folders have to be shared by its machines.
 """
 
 import argparse
@@ -90,7 +90,8 @@ def made_from(out):
 
 def _share_out(waiting, options, workers, threads, partial):
     """One job at a time for each worker, so that one that dies takes no other job with it."""
-    remote = ray.remote(num_cpus=threads, max_restarts=-1, max_task_retries=1)(Worker)
+    # Ray counts a call that finds no worker yet as a try, so that one death may take two. A pair that always ends its worker is given up.
+    remote = ray.remote(num_cpus=threads, max_restarts=-1, max_task_retries=3)(Worker)
     environment = {"env_vars": {"RAYON_NUM_THREADS": str(threads)}}
     idle = [remote.options(runtime_env=environment).remote(options) for _ in range(workers)]
     jobs, running = _jobs(waiting, partial), {}
@@ -118,7 +119,7 @@ def _outcome(pair, done):
     except ray.exceptions.RayTaskError as error:
         return Outcome(source, target, out, error=str(error.cause))
     except ray.exceptions.RayError as error:
-        return Outcome(source, target, out, error=f"{source} -> {target}: the worker died twice: {error}")
+        return Outcome(source, target, out, error=f"{source} -> {target}: its worker died: {error}")
 
 
 class _Job:

@@ -56,6 +56,42 @@ class PointMap(_NamedTuple):
     """ndarray of float32, [n_source] : From 0 to 1."""
 
 
+class Barycentric(_NamedTuple):
+    """Points on a surface: ``(weights[:, :, None] * vertices[target_faces[faces]]).sum(axis=1)`` are their positions."""
+
+    faces: "object"
+    """ndarray of int32, [n_source] : Triangle of the target, -1 where there is none."""
+    weights: "object"
+    """ndarray of float64, [n_source, 3] : Weights of its corners, of sum 1; 0 where there is no triangle."""
+
+
+class Quality(_NamedTuple):
+    """How good a map is, told without ground truth; the names are those of ``fmnet-infer match --json``."""
+
+    expected_error: float
+    """Mean geodesic error to expect, in units of sqrt(area), times 100."""
+    probability_bad: float
+    """Probability that it is above 10."""
+    doubtful: bool
+    """Whether the map should not be used without a look."""
+    mirrored: bool
+    """Whether the map turns the surface inside out."""
+    commutativity: float
+    """How far the functional map is from commuting with the Laplacians, from 0 to 1."""
+    orthogonality: float
+    """How far the functional map is from orthogonal."""
+    dirichlet: float
+    """Dirichlet energy of the target's coordinates on the source; 2 for an isometry."""
+    stretched: float
+    """Share of the source's edges that are stretched more than five times."""
+    reversed: float
+    """Share of the source's area whose orientation is reversed."""
+    cycle: "float | None"
+    """Mean distance from a vertex to where the map there and back takes it, relative to sqrt(area)."""
+    coverage: float
+    """Share of the target's area that is matched."""
+
+
 class Refined(_NamedTuple):
     """A refined map."""
 

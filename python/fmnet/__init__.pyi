@@ -25,7 +25,8 @@ _Progress = Callable[[str, str, Union[float, None]], object]
 _Descriptor = Literal["learned", "shot"]
 _Solver = Literal["least-squares", "regularized", "bidirectional", "joint", "part"]
 _Refinement = Literal["none", "icp", "zoomout", "wavelet", "pmf", "shared-triangulation"]
-_Upscaling = Literal["l21", "least-squares"]
+_Upscaling = Literal["surface", "l21", "least-squares"]
+_Effort = Literal["low", "normal", "high"]
 _Decimate = Union[int, Literal["off"]]
 _Side = Literal["source", "target"]
 
@@ -40,6 +41,23 @@ class Eigenbasis(NamedTuple):
 class PointMap(NamedTuple):
     targets: NDArray[np.int32]
     confidence: NDArray[np.float32]
+
+class Barycentric(NamedTuple):
+    faces: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+class Quality(NamedTuple):
+    expected_error: float
+    probability_bad: float
+    doubtful: bool
+    mirrored: bool
+    commutativity: float
+    orthogonality: float
+    dirichlet: float
+    stretched: float
+    reversed: float
+    cycle: float | None
+    coverage: float
 
 class Refined(NamedTuple):
     targets: NDArray[np.int32]
@@ -78,6 +96,10 @@ class Match:
     @property
     def functional_map(self) -> NDArray[np.float64]: ...
     @property
+    def barycentric(self) -> Barycentric | None: ...
+    @property
+    def quality(self) -> Quality: ...
+    @property
     def n_source(self) -> int: ...
     @property
     def n_target(self) -> int: ...
@@ -115,7 +137,8 @@ class Matcher:
         fm: _Solver | None = None,
         mask_weight: float | None = None,
         refine: _Refinement | None = None,
-        upscale: _Upscaling = "l21",
+        upscale: _Upscaling = "surface",
+        effort: _Effort = "normal",
         decimate: _Decimate | None = None,
         shot_radius: float | None = None,
         cache: _Path | None = None,
@@ -154,7 +177,8 @@ def match(
     fm: _Solver | None = None,
     mask_weight: float | None = None,
     refine: _Refinement | None = None,
-    upscale: _Upscaling = "l21",
+    upscale: _Upscaling = "surface",
+    effort: _Effort = "normal",
     decimate: _Decimate | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,

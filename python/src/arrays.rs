@@ -43,8 +43,7 @@ pub(crate) fn check_shape(
 fn cast<T: Element + Copy>(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<T>> {
     let py = array.py();
     let numpy = py.import(intern!(py, "numpy"))?;
-    let contiguous =
-        numpy.call_method1(intern!(py, "ascontiguousarray"), (array, numpy::dtype::<T>(py)))?;
+    let contiguous = numpy.call_method1(intern!(py, "ascontiguousarray"), (array, numpy::dtype::<T>(py)))?;
     let contiguous = contiguous.cast_into::<numpy::PyArrayDyn<T>>().map_err(wrong)?;
     Ok(contiguous.readonly().as_slice().map_err(wrong)?.to_vec())
 }
@@ -82,11 +81,7 @@ pub(crate) fn reals(
 }
 
 /// A matrix of real numbers.
-pub(crate) fn matrix(
-    object: &Bound<'_, PyAny>,
-    wanted: [Option<usize>; 2],
-    what: &str,
-) -> PyResult<Matrix> {
+pub(crate) fn matrix(object: &Bound<'_, PyAny>, wanted: [Option<usize>; 2], what: &str) -> PyResult<Matrix> {
     let (data, shape) = reals(object, &wanted, what)?;
     Ok(Matrix::from_vec(shape[0], shape[1], data))
 }
@@ -120,7 +115,10 @@ pub(crate) fn view<'py, T: Element, D: Dimension>(
 }
 
 /// A matrix as an array of its own.
-pub(crate) fn out_matrix<T: Element + Copy>(py: Python<'_>, matrix: Matrix<T>) -> PyResult<Bound<'_, PyArray2<T>>> {
+pub(crate) fn out_matrix<T: Element + Copy>(
+    py: Python<'_>,
+    matrix: Matrix<T>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     let shape = [matrix.rows(), matrix.cols()];
     PyArray1::from_vec(py, matrix.into_data()).reshape(shape)
 }

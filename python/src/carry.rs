@@ -116,7 +116,10 @@ fn labels<'py>(
         let sign = if kind(array) == b'i' { -1 } else { 0 };
         moved.set_item(PyArray1::from_vec(py, missing), sign)?;
         if sign == 0 {
-            warn(py, &format!("{count} vertices without a match have 0, as the type has no other sign for them"))?;
+            warn(
+                py,
+                &format!("{count} vertices without a match have 0, as the type has no other sign for them"),
+            )?;
         }
     }
     Ok(moved)
@@ -154,9 +157,11 @@ pub(crate) fn transfer_landmarks<'py>(
     let n = way.giver.n_vertices();
     let vertex = |&v: &i64| u32::try_from(v).ok().filter(|&v| (v as usize) < n).ok_or(v);
     let landmarks: Result<Vec<u32>, i64> = landmarks.iter().map(vertex).collect();
-    let landmarks =
-        landmarks.map_err(|v| wrong(format!("landmarks: there is no vertex {v}; the giving mesh has {n} (0-based)")))?;
-    let moved = run(py, None, move |_| Ok(carry_landmarks(&landmarks, &way.giver, &way.receiver, &way.donors)))?;
+    let landmarks = landmarks.map_err(|v| {
+        wrong(format!("landmarks: there is no vertex {v}; the giving mesh has {n} (0-based)"))
+    })?;
+    let moved =
+        run(py, None, move |_| Ok(carry_landmarks(&landmarks, &way.giver, &way.receiver, &way.donors)))?;
     Ok(PyArray1::from_vec(py, moved.iter().map(|v| v.map_or(-1, |v| v as i32)).collect()))
 }
 

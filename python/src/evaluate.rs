@@ -43,10 +43,11 @@ pub(crate) fn geodesic_distances<'py>(
         let n = mesh.n_vertices();
         let vertex = |&v: &i64| u32::try_from(v).ok().filter(|&v| (v as usize) < n).ok_or(v);
         let sources = sources.map_or(Ok((0..n as u32).collect()), |s| s.iter().map(vertex).collect());
-        let sources: Vec<u32> =
-            sources.map_err(|v| said(format!("sources: there is no vertex {v}; the mesh has {n} (0-based)")))?;
+        let sources: Vec<u32> = sources
+            .map_err(|v| said(format!("sources: there is no vertex {v}; the mesh has {n} (0-based)")))?;
         let needed = 4 * n as u64 * sources.len() as u64;
-        let _reserved = memory::reserve("the distances", needed, "ask for those from fewer sources at a time")?;
+        let _reserved =
+            memory::reserve("the distances", needed, "ask for those from fewer sources at a time")?;
         Ok(GeodesicSolver::new(&mesh, &GeodesicOptions::default()).from_sources(&sources))
     })?;
     let n = distances.cols();
@@ -158,7 +159,8 @@ pub(crate) fn evaluate(
     let n_source = own.as_ref().unwrap_or(targets).len()?;
     let map = in_map(targets, n_source, n_target, "targets")?;
     let truth = in_map(truth, n_source, n_target, "truth")?;
-    let mirrored = symmetric_truth.map(|truth| in_map(truth, n_source, n_target, "symmetric_truth")).transpose()?;
+    let mirrored =
+        symmetric_truth.map(|truth| in_map(truth, n_source, n_target, "symmetric_truth")).transpose()?;
     if truth.iter().flatten().next().is_none() {
         return Err(wrong("truth: no vertex has a match, so there is nothing to measure"));
     }
@@ -175,7 +177,11 @@ pub(crate) fn evaluate(
             }
         };
         let mut of_vertex = vec![f32::NAN; n_source];
-        pairs.pairs().iter().zip(&errors).for_each(|(&(source, _), &error)| of_vertex[source as usize] = error);
+        pairs
+            .pairs()
+            .iter()
+            .zip(&errors)
+            .for_each(|(&(source, _), &error)| of_vertex[source as usize] = error);
         Ok(Evaluation { summary: ErrorSummary::new(&errors, area), errors: of_vertex, mirrored: is_mirrored })
     })
 }

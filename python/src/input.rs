@@ -83,7 +83,9 @@ impl Input {
     pub(crate) fn load_mesh(self, what: &str, observer: Observer) -> Result<Mesh, Failure> {
         match self.load(what, observer)? {
             Loaded::Mesh(_, mesh) => Ok(mesh),
-            Loaded::Shape(_) => Err(Failure::Said(format!("{what}: a described shape, expected the mesh itself"))),
+            Loaded::Shape(_) => {
+                Err(Failure::Said(format!("{what}: a described shape, expected the mesh itself")))
+            }
         }
     }
 }

@@ -30,8 +30,10 @@ use std::sync::Arc;
 ///     Weight of the mask of the regularised solvers, 0 and up.
 /// refine : {"none", "icp", "zoomout", "wavelet", "pmf", "shared-triangulation"}, optional
 ///     Refinement of the map. Default: what suits the solver; none with SHOT.
-/// upscale : {"l21", "least-squares"}
+/// upscale : {"surface", "l21", "least-squares"}
 ///     How the map of decimated meshes becomes one of the full meshes.
+/// effort : {"low", "normal", "high"}
+///     How many ways to a map are tried: one, others where the first looks doubtful, or all.
 /// decimate : int or "off", optional
 ///     Meshes of more vertices are decimated to so many, 100 and up. Default: the model's; 15000 with SHOT.
 /// shot_radius : float, optional
@@ -57,8 +59,8 @@ fn load(py: Python<'_>, options: MatchOptions) -> PyResult<Matcher> {
 #[pymethods]
 impl Matcher {
     #[new]
-    #[pyo3(signature = (model=None, *, descriptor="learned", k=None, fm=None, mask_weight=None, refine=None, upscale="l21",
-                        decimate=None, shot_radius=None, cache=None))]
+    #[pyo3(signature = (model=None, *, descriptor="learned", k=None, fm=None, mask_weight=None, refine=None, upscale="surface",
+                        effort="normal", decimate=None, shot_radius=None, cache=None))]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn new(
         py: Python<'_>,
@@ -69,11 +71,24 @@ impl Matcher {
         mask_weight: Option<f64>,
         refine: Option<&str>,
         upscale: &str,
+        effort: &str,
         decimate: Option<Bound<'_, PyAny>>,
         shot_radius: Option<f64>,
         cache: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let given = Given { model, descriptor, k, fm, mask_weight, refine, upscale, decimate, shot_radius, cache };
+        let given = Given {
+            model,
+            descriptor,
+            k,
+            fm,
+            mask_weight,
+            refine,
+            upscale,
+            effort,
+            decimate,
+            shot_radius,
+            cache,
+        };
         load(py, given.options()?)
     }
 
@@ -195,13 +210,15 @@ impl Matcher {
     fn map_key(&self, source_hash: &str, target_hash: &str, partial: bool) -> PyResult<String> {
         let keys = MapKeys::new(&self.inner, &self.options, partial);
         let hash = |text| {
-            CacheKey::from_hex(text).ok_or_else(|| wrong(format!("{text:?} is no hash of a mesh; see fmnet.mesh_hash")))
+            CacheKey::from_hex(text)
+                .ok_or_else(|| wrong(format!("{text:?} is no hash of a mesh; see fmnet.mesh_hash")))
         };
         Ok(keys.of_meshes(hash(source_hash)?, hash(target_hash)?))
     }
 
     fn __repr__(&self) -> String {
-        let model = self.inner.network().map_or("SHOT".to_owned(), |network| network.path().display().to_string());
+        let model =
+            self.inner.network().map_or("SHOT".to_owned(), |network| network.path().display().to_string());
         format!("<fmnet.Matcher, {model}, k = {}>", self.inner.k())
     }
 }
@@ -223,7 +240,7 @@ impl Matcher {
 ///     The source is a part of the target, in whatever pose and the same unit of length.
 /// progress : callable, optional
 ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
-/// model, descriptor, k, fm, mask_weight, refine, upscale, decimate, shot_radius, cache
+/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, decimate, shot_radius, cache
 ///     As of :class:`Matcher`.
 ///
 /// Returns
@@ -236,7 +253,7 @@ impl Matcher {
 /// >>> match.targets  # for every vertex of man.obj the vertex of woman.glb
 #[pyfunction]
 #[pyo3(name = "match", signature = (source, target, *, partial=false, progress=None, model=None, descriptor="learned", k=None, fm=None,
-                    mask_weight=None, refine=None, upscale="l21", decimate=None, shot_radius=None, cache=None))]
+                    mask_weight=None, refine=None, upscale="surface", effort="normal", decimate=None, shot_radius=None, cache=None))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn match_(
     py: Python<'_>,
@@ -251,11 +268,24 @@ pub(crate) fn match_(
     mask_weight: Option<f64>,
     refine: Option<&str>,
     upscale: &str,
+    effort: &str,
     decimate: Option<Bound<'_, PyAny>>,
     shot_radius: Option<f64>,
     cache: Option<PathBuf>,
 ) -> PyResult<Match> {
-    let given = Given { model, descriptor, k, fm, mask_weight, refine, upscale, decimate, shot_radius, cache };
+    let given = Given {
+        model,
+        descriptor,
+        k,
+        fm,
+        mask_weight,
+        refine,
+        upscale,
+        effort,
+        decimate,
+        shot_radius,
+        cache,
+    };
     load(py, given.options()?)?.match_(py, source, target, partial, progress)
 }
 

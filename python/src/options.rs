@@ -17,6 +17,7 @@ pub(crate) struct Given<'a, 'py> {
     pub(crate) mask_weight: Option<f64>,
     pub(crate) refine: Option<&'a str>,
     pub(crate) upscale: &'a str,
+    pub(crate) effort: &'a str,
     pub(crate) decimate: Option<Bound<'py, PyAny>>,
     pub(crate) shot_radius: Option<f64>,
     pub(crate) cache: Option<PathBuf>,
@@ -39,6 +40,7 @@ impl Given<'_, '_> {
             solver: FmapSolver::chosen(fm, weight(self.mask_weight)?),
             refinement: self.refine.map(|name| named("refine", name)).transpose()?,
             upscaling: named("upscale", self.upscale)?,
+            effort: named("effort", self.effort)?,
             decimate: self.decimate.as_ref().map(decimation).transpose()?,
             shot_radius: self.shot_radius,
             cache: self.cache,
@@ -67,6 +69,8 @@ fn decimation(value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     match value.extract::<usize>() {
         _ if is_off => Ok(None),
         Ok(n) if n >= 100 => Ok(Some(n)),
-        _ => Err(wrong(format!("decimate is {value}, expected a number of vertices, 100 or more, or \"off\""))),
+        _ => {
+            Err(wrong(format!("decimate is {value}, expected a number of vertices, 100 or more, or \"off\"")))
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! What came of a pair.
 
-use crate::arrays::{same_bytes, view};
+use crate::arrays::{out_matrix, same_bytes, view};
 use crate::errors::io_error;
+use crate::stages::named_tuple;
+use fmnet::Matrix;
 use fmnet::batch::write_map;
 use fmnet::io::write_point_map;
 use fmnet::pipeline::Match as Found;
@@ -39,6 +41,40 @@ impl Match {
         view(slf.as_any(), (matrix.rows(), matrix.cols()), matrix.data())
     }
 
+    /// Barycentric or None : The point on the target's surface that each source vertex goes to, finer than its vertex.
+    #[getter]
+    fn barycentric<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let Some(points) = &self.inner.map.points else { return Ok(None) };
+        let faces = points.iter().map(|point| point.map_or(-1, |point| point.face as i32)).collect();
+        let weights = Matrix::from_vec(
+            points.len(),
+            3,
+            points.iter().flat_map(|point| point.map_or([0.0; 3], |point| point.weights)).collect(),
+        );
+        named_tuple(py, "Barycentric", (PyArray1::from_vec(py, faces), out_matrix(py, weights)?)).map(Some)
+    }
+
+    /// Quality : How good the map is, told without ground truth.
+    #[getter]
+    fn quality<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (quality, estimate) = (&self.inner.quality, &self.inner.estimate);
+        let mirrored = quality.is_mirrored();
+        let values = (
+            estimate.expected_error,
+            estimate.bad,
+            estimate.doubtful || mirrored,
+            mirrored,
+            quality.commutativity,
+            quality.orthogonality,
+            quality.dirichlet,
+            quality.stretched,
+            quality.reversed,
+            quality.cycle,
+            quality.coverage,
+        );
+        named_tuple(py, "Quality", values)
+    }
+
     /// int : Number of source vertices.
     #[getter]
     fn n_source(&self) -> usize {
@@ -73,6 +109,8 @@ impl Match {
     fn __repr__(&self) -> String {
         let map = &self.inner.map;
         let matched = map.iter().flatten().count();
-        format!("<fmnet.Match, {matched} of {} source vertices matched>", map.len())
+        let doubt =
+            if self.inner.estimate.doubtful || self.inner.quality.is_mirrored() { ", DOUBTFUL" } else { "" };
+        format!("<fmnet.Match, {matched} of {} source vertices matched{doubt}>", map.len())
     }
 }

@@ -42,10 +42,13 @@ pub(crate) fn eigenbasis<'py>(
     let basis = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
         let needed = memory::eigenbasis_bytes(mesh.n_vertices(), k);
-        let _reserved = memory::reserve("the eigenbasis", needed, "ask for fewer pairs, or decimate the mesh")?;
+        let _reserved =
+            memory::reserve("the eigenbasis", needed, "ask for fewer pairs, or decimate the mesh")?;
         let (basis, info) = compute_eigenbasis(&Laplacian::new(&mesh), k, &EigenOptions::default())?;
         if info.complete == Some(false) {
-            let text = format!("the eigenbasis of {k} pairs lacks some eigenvalue below its last one; try another k");
+            let text = format!(
+                "the eigenbasis of {k} pairs lacks some eigenvalue below its last one; try another k"
+            );
             observer(fmnet::events::Event::Warning(text));
         }
         Ok(if unit_area { basis.at_unit_area(k) } else { basis })
@@ -82,7 +85,8 @@ pub(crate) fn shot<'py>(
     let options = ShotOptions { radius, bins, min_neighbors };
     let descriptors = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
-        let _reserved = memory::reserve("SHOT", memory::descriptor_bytes(mesh.n_vertices(), 0), "decimate the mesh")?;
+        let _reserved =
+            memory::reserve("SHOT", memory::descriptor_bytes(mesh.n_vertices(), 0), "decimate the mesh")?;
         Ok(compute_shot(&mesh, &options)?.0)
     })?;
     Ok(out_matrix(py, descriptors)?.into_any())
@@ -159,10 +163,13 @@ pub(crate) fn point_map<'py>(
         "adjoint" => Comparison::Adjoint,
         "joint" => Comparison::Joint,
         other => {
-            return Err(wrong(format!("comparison is {other:?}, expected \"distance\", \"adjoint\" or \"joint\"")));
+            return Err(wrong(format!(
+                "comparison is {other:?}, expected \"distance\", \"adjoint\" or \"joint\""
+            )));
         }
     };
-    let (source, target) = (first(source, map.cols(), "source_basis")?, first(target, map.rows(), "target_basis")?);
+    let (source, target) =
+        (first(source, map.cols(), "source_basis")?, first(target, map.rows(), "target_basis")?);
     let found = run(py, None, move |_| Ok(recover_by(comparison, &map, &source, &target)?))?;
     named_tuple(py, "PointMap", (out_targets(py, &found), out_confidence(py, &found)))
 }
@@ -206,7 +213,7 @@ pub(crate) fn zoomout<'py>(
 }
 
 /// A tuple of the package with names.
-fn named_tuple<'py>(
+pub(crate) fn named_tuple<'py>(
     py: Python<'py>,
     name: &str,
     values: impl pyo3::call::PyCallArgs<'py>,
@@ -246,7 +253,9 @@ fn in_basis(object: &Bound<'_, PyAny>, what: &str) -> PyResult<Eigenbasis> {
 /// The first `k` pairs.
 fn first(basis: Eigenbasis, k: usize, what: &str) -> PyResult<Eigenbasis> {
     match basis.k() {
-        found if found < k => Err(wrong(format!("{what}: {found} eigenpairs, but the functional map has {k}"))),
+        found if found < k => {
+            Err(wrong(format!("{what}: {found} eigenpairs, but the functional map has {k}")))
+        }
         found if found == k => Ok(basis),
         _ => Ok(basis.truncated(k)),
     }

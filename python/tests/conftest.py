@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def demo():
-    """The two bodies of the demo: files of 2502 vertices that correspond by index."""
+    """The two bodies of the demo: files of 2400 vertices, of which the first 1000 correspond by index."""
     folder = ROOT / "runtime" / "demo"
     return folder / "source.ply", folder / "target.ply"
 
@@ -29,6 +29,7 @@ def program():
     def run(*arguments):
         done = subprocess.run([found, "--quiet", *map(str, arguments)], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+        return done.stdout
 
     return run
 

@@ -30,7 +30,7 @@ def needs(*packages):
 def test_match_and_plot(demo, tmp_path):
     import matplotlib.image
 
-    assert "2502 of 2502 vertices matched" in run("match_and_plot.py", *demo, tmp_path / "pair.png")
+    assert "2400 of 2400 vertices matched" in run("match_and_plot.py", *demo, tmp_path / "pair.png")
     picture = matplotlib.image.imread(tmp_path / "pair.png")
     left, right = np.array_split(picture[..., :3], 2, axis=1)
     for half in (left, right):
@@ -47,11 +47,13 @@ def test_transfer_texture(demo, tmp_path):
     giver = trimesh.load(demo[1], process=False)
     assert len(textured.faces) == len(trimesh.load(demo[0], process=False).faces)
     assert textured.visual.material.baseColorTexture.size == (512, 512)
-    # The bodies correspond by index: each corner has about the coordinates of its own vertex on the giver.
+    # The first vertices correspond by index: each has about the coordinates of its own vertex on the giver.
     low, high = giver.bounds
-    expected = ((giver.vertices - low) / (high - low))[:, :2][giver.faces]
-    found = np.asarray(textured.visual.uv)[textured.faces]
-    assert np.median(np.linalg.norm(found - expected, axis=2)) < 0.05
+    expected = ((giver.vertices - low) / (high - low))[:, :2]
+    receiver = trimesh.load(demo[0], process=False)
+    vertices, found = receiver.faces.ravel(), np.asarray(textured.visual.uv)[textured.faces].reshape(-1, 2)
+    known = vertices < 1000
+    assert np.median(np.linalg.norm(found[known] - expected[vertices[known]], axis=1)) < 0.05
 
 
 @needs("tqdm")
@@ -71,14 +73,16 @@ def test_landmarks(demo, tmp_path):
 @pytest.mark.filterwarnings("default")
 def test_compare_pyfm(demo, tmp_path):
     (tmp_path / "registrations").mkdir()
-    # pyFM reads OFF and OBJ.
-    for path in demo:
-        shape = fmnet.Matcher(descriptor="shot", k=10).describe(path)
-        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in shape.vertices.tolist()]
+    shape = fmnet.Matcher(descriptor="shot", k=10).describe(demo[0])
+    height = shape.vertices[:, 1]
+    for name, bend in [("a", 0.0), ("b", 0.3)]:
+        vertices = shape.vertices + np.column_stack([bend * height**2, 0 * height, 0 * height])
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (shape.faces.astype(int) + 1).tolist()]
-        (tmp_path / "registrations" / f"{path.stem}.obj").write_text("\n".join(lines) + "\n")
+        (tmp_path / "registrations" / f"{name}.obj").write_text("\n".join(lines) + "\n")
     table = run("compare_pyfm.py", tmp_path / "registrations", "--pairs", 1)
-    rows = {line.split()[0]: [float(word.rstrip("%")) for word in line.split()[1:]] for line in table.splitlines()[-2:] if line.startswith(("fmnet", "pyFM "))}
+    words = [line.split() for line in table.splitlines()]
+    rows = {name: [float(word.rstrip("%")) for word in rest] for name, *rest in words if name in ("fmnet", "pyFM") and len(rest) == 4}
     assert rows["fmnet"][0] < 10
     if importlib.util.find_spec("pyFM") is None:
         assert "pyFM is not installed" in table

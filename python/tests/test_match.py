@@ -1,7 +1,9 @@
 """Matching: the same bytes as the program, whatever the form of the meshes."""
 
+import json
 import pickle
 import types
+import warnings
 
 import fmnet
 import numpy as np
@@ -30,7 +32,8 @@ def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
         dict(descriptor="shot", k=30, shot_radius=0.1),
         dict(refine="zoomout", k=50),
         dict(fm="bidirectional", mask_weight=0.1, refine="none"),
-        dict(decimate=1000, upscale="least-squares"),
+        dict(decimate=1000, upscale="least-squares", effort="low"),
+        dict(decimate=1000),
         dict(decimate="off", refine="icp"),
     ],
     ids=str,
@@ -137,6 +140,28 @@ def test_shapes_of_another_model_are_refused(mesh, tmp_path):
         matcher.load(tmp_path / "cut.fms")
     with pytest.raises(fmnet.Error, match="whole_area"):
         matcher.match(shape, mesh, partial=True)
+
+
+def test_quality_and_points_on_the_surface(demo, program, mesh, tmp_path):
+    match = fmnet.match(*demo)
+    said = json.loads(program("match", *demo, "-o", tmp_path / "p.txt", "--json"))["quality"]
+    assert match.quality._asdict() == said
+    assert not match.quality.doubtful and 0 < match.quality.expected_error < 10
+    # The points are near the vertices that the vertex map names.
+    target = fmnet.Matcher(descriptor="shot", k=10).describe(demo[1])
+    faces, weights = match.barycentric
+    assert (faces.dtype, faces.shape, weights.shape) == (np.int32, (2400,), (2400, 3))
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    points = (weights[:, :, None] * target.vertices[target.faces[faces]]).sum(axis=1)
+    apart = np.linalg.norm(points - target.vertices[match.targets], axis=1)
+    edges = target.vertices[target.faces]
+    assert apart.mean() < np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).mean()
+    # An inside-out copy is a mirrored map.
+    flipped = mesh[0] * [-1, 1, 1], mesh[1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mirrored = fmnet.match(mesh, flipped, descriptor="shot", k=10, shot_radius=0.2)
+    assert mirrored.quality.reversed > match.quality.reversed
 
 
 def test_the_cache_is_used(mesh, tmp_path):
