@@ -23,11 +23,11 @@ def operator():
     if shutil.which(program) is None:
         pytest.skip("no fmnet-infer: build it or name it in FMNET_INFER")
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    assert addon_utils.enable("fmnet_transfer") is not None
+    assert addon_utils.enable("fmnet_transfer", default_set=True) is not None
     preferences = bpy.context.preferences.addons["fmnet_transfer"].preferences
     preferences.program = program
     yield bpy.ops.object.fmnet_transfer
-    addon_utils.disable("fmnet_transfer")
+    addon_utils.disable("fmnet_transfer", default_set=True)
 
 
 def add(name, vertices, faces, scale=1.0):
