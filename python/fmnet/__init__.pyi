@@ -26,6 +26,7 @@ _Descriptor = Literal["learned", "shot"]
 _Solver = Literal["least-squares", "regularized", "bidirectional", "joint", "part"]
 _Refinement = Literal["none", "icp", "zoomout", "wavelet", "pmf", "shared-triangulation"]
 _Upscaling = Literal["surface", "l21", "least-squares"]
+_Backend = Literal["native", "tract"]
 _Effort = Literal["low", "normal", "high"]
 _Decimate = Union[int, Literal["off"]]
 _Side = Literal["source", "target"]
@@ -139,9 +140,11 @@ class Matcher:
         refine: _Refinement | None = None,
         upscale: _Upscaling = "surface",
         effort: _Effort = "normal",
+        adapt: int | None = None,
         decimate: _Decimate | None = None,
         shot_radius: float | None = None,
         cache: _Path | None = None,
+        backend: _Backend = "native",
     ) -> Matcher: ...
     @property
     def k(self) -> int: ...
@@ -179,9 +182,11 @@ def match(
     refine: _Refinement | None = None,
     upscale: _Upscaling = "surface",
     effort: _Effort = "normal",
+    adapt: int | None = None,
     decimate: _Decimate | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
+    backend: _Backend = "native",
 ) -> Match: ...
 def features(
     mesh: _Mesh,
@@ -193,6 +198,7 @@ def features(
     decimate: _Decimate | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
+    backend: _Backend = "native",
 ) -> dict[str, NDArray[Any]]: ...
 def eigenbasis(mesh: _Mesh, k: int, *, unit_area: bool = True) -> Eigenbasis: ...
 def shot(

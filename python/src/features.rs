@@ -31,7 +31,7 @@ struct Found {
 ///     Vertices [n_input, 3] of float32 or float64, faces [m, 3] of integers.
 /// progress : callable, optional
 ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
-/// model, descriptor, k, decimate, shot_radius, cache
+/// model, descriptor, k, decimate, shot_radius, cache, backend
 ///     As of :class:`Matcher`.
 ///
 /// Returns
@@ -40,7 +40,8 @@ struct Found {
 ///     ``eigenvalues`` [k], ``eigenvectors`` [n, k], ``mass`` [n]; the model's other inputs by name, such as ``gradients_x``
 ///     [n, k]; ``descriptors`` [n, d], or ``shot`` [n, 352]; ``vertices`` [n]: the mesh's vertex of each row.
 #[pyfunction]
-#[pyo3(signature = (mesh, *, progress=None, model=None, descriptor="learned", k=None, decimate=None, shot_radius=None, cache=None))]
+#[pyo3(signature = (mesh, *, progress=None, model=None, descriptor="learned", k=None, decimate=None, shot_radius=None, cache=None,
+                    backend="native"))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn features<'py>(
     py: Python<'py>,
@@ -52,6 +53,7 @@ pub(crate) fn features<'py>(
     decimate: Option<Bound<'py, PyAny>>,
     shot_radius: Option<f64>,
     cache: Option<PathBuf>,
+    backend: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
     let given = Given {
         model,
@@ -62,6 +64,8 @@ pub(crate) fn features<'py>(
         refine: None,
         upscale: "surface",
         effort: "normal",
+        adapt: None,
+        backend,
         decimate,
         shot_radius,
         cache,

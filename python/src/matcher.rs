@@ -34,12 +34,17 @@ use std::sync::Arc;
 ///     How the map of decimated meshes becomes one of the full meshes.
 /// effort : {"low", "normal", "high"}
 ///     How many ways to a map are tried: one, others where the first looks doubtful, or all.
+/// adapt : int, optional
+///     Adapt the network to the pair by so many steps, 0 to 100, about half a second each; the map is taken if it looks better.
+///     Default: 10 where the first map is doubtful, else 0.
 /// decimate : int or "off", optional
 ///     Meshes of more vertices are decimated to so many, 100 and up. Default: the model's; 15000 with SHOT.
 /// shot_radius : float, optional
 ///     SHOT radius relative to sqrt(area), between 0 and 1. Default: the model's; 0.067 with SHOT.
 /// cache : path-like, optional
 ///     Folder in which what is computed of each shape is kept and found again.
+/// backend : {"native", "tract"}
+///     What computes the network.
 ///
 /// Notes
 /// -----
@@ -60,7 +65,8 @@ fn load(py: Python<'_>, options: MatchOptions) -> PyResult<Matcher> {
 impl Matcher {
     #[new]
     #[pyo3(signature = (model=None, *, descriptor="learned", k=None, fm=None, mask_weight=None, refine=None, upscale="surface",
-                        effort="normal", decimate=None, shot_radius=None, cache=None))]
+                        effort="normal", adapt=None, decimate=None, shot_radius=None, cache=None,
+                        backend="native"))]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn new(
         py: Python<'_>,
@@ -72,9 +78,11 @@ impl Matcher {
         refine: Option<&str>,
         upscale: &str,
         effort: &str,
+        adapt: Option<usize>,
         decimate: Option<Bound<'_, PyAny>>,
         shot_radius: Option<f64>,
         cache: Option<PathBuf>,
+        backend: &str,
     ) -> PyResult<Self> {
         let given = Given {
             model,
@@ -85,9 +93,11 @@ impl Matcher {
             refine,
             upscale,
             effort,
+            adapt,
             decimate,
             shot_radius,
             cache,
+            backend,
         };
         load(py, given.options()?)
     }
@@ -240,7 +250,7 @@ impl Matcher {
 ///     The source is a part of the target, in whatever pose and the same unit of length.
 /// progress : callable, optional
 ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
-/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, decimate, shot_radius, cache
+/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, adapt, decimate, shot_radius, cache
 ///     As of :class:`Matcher`.
 ///
 /// Returns
@@ -253,7 +263,8 @@ impl Matcher {
 /// >>> match.targets  # for every vertex of man.obj the vertex of woman.glb
 #[pyfunction]
 #[pyo3(name = "match", signature = (source, target, *, partial=false, progress=None, model=None, descriptor="learned", k=None, fm=None,
-                    mask_weight=None, refine=None, upscale="surface", effort="normal", decimate=None, shot_radius=None, cache=None))]
+                    mask_weight=None, refine=None, upscale="surface", effort="normal", adapt=None, decimate=None, shot_radius=None, cache=None,
+                        backend="native"))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn match_(
     py: Python<'_>,
@@ -269,9 +280,11 @@ pub(crate) fn match_(
     refine: Option<&str>,
     upscale: &str,
     effort: &str,
+    adapt: Option<usize>,
     decimate: Option<Bound<'_, PyAny>>,
     shot_radius: Option<f64>,
     cache: Option<PathBuf>,
+    backend: &str,
 ) -> PyResult<Match> {
     let given = Given {
         model,
@@ -282,9 +295,11 @@ pub(crate) fn match_(
         refine,
         upscale,
         effort,
+        adapt,
         decimate,
         shot_radius,
         cache,
+        backend,
     };
     load(py, given.options()?)?.match_(py, source, target, partial, progress)
 }

@@ -18,6 +18,8 @@ pub(crate) struct Given<'a, 'py> {
     pub(crate) refine: Option<&'a str>,
     pub(crate) upscale: &'a str,
     pub(crate) effort: &'a str,
+    pub(crate) adapt: Option<usize>,
+    pub(crate) backend: &'a str,
     pub(crate) decimate: Option<Bound<'py, PyAny>>,
     pub(crate) shot_radius: Option<f64>,
     pub(crate) cache: Option<PathBuf>,
@@ -32,6 +34,9 @@ impl Given<'_, '_> {
         if let Some(radius) = self.shot_radius.filter(|&r| !(r > 0.0 && r < 1.0)) {
             return Err(wrong(format!("shot_radius is {radius}, expected a number between 0 and 1")));
         }
+        if let Some(steps) = self.adapt.filter(|&steps| steps > 100) {
+            return Err(wrong(format!("adapt is {steps}, expected 0 to 100")));
+        }
         let fm: Option<SolverKind> = self.fm.map(|name| named("fm", name)).transpose()?;
         Ok(MatchOptions {
             descriptor: named("descriptor", self.descriptor)?,
@@ -41,6 +46,8 @@ impl Given<'_, '_> {
             refinement: self.refine.map(|name| named("refine", name)).transpose()?,
             upscaling: named("upscale", self.upscale)?,
             effort: named("effort", self.effort)?,
+            adapt: self.adapt,
+            backend: named("backend", self.backend)?,
             decimate: self.decimate.as_ref().map(decimation).transpose()?,
             shot_radius: self.shot_radius,
             cache: self.cache,

@@ -92,8 +92,8 @@ impl Match {
     /// Parameters
     /// ----------
     /// path : path-like
-    ///     ``.txt`` (a 0-based target vertex a line, -1 where unmatched), ``.vts`` (1-based), ``.npy`` (int32) or ``.csv``
-    ///     (with confidences): the same bytes as the program writes.
+    ///     ``.txt`` (a 0-based target vertex a line, -1 where unmatched), ``.vts`` (1-based), ``.npy`` (int32), ``.csv``
+    ///     (with confidences and points) or ``.npz`` (the same as arrays): the same bytes as the program writes.
     /// key : str, optional
     ///     What the map was made from (:meth:`Matcher.map_key`), written beside it as ``fmnet-infer batch`` does.
     #[pyo3(signature = (path, *, key=None))]

@@ -47,6 +47,8 @@ def test_bad_meshes(mesh, form, text):
         (dict(decimate=3), "decimate is 3, expected a number of vertices"),
         (dict(decimate="no"), "decimate is no"),
         (dict(shot_radius=2.0), "shot_radius is 2"),
+        (dict(adapt=101), "adapt is 101, expected 0 to 100"),
+        (dict(backend="gpu"), "backend: unknown variant `gpu`"),
         (dict(descriptor="sift"), "descriptor: unknown variant `sift`"),
     ],
 )

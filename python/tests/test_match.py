@@ -17,9 +17,9 @@ SHOT = dict(descriptor="shot", k=40, shot_radius=0.2)
 def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
     source, target = demo
     match = fmnet.match(source, target)
-    program("match", source, target, "-o", tmp_path / "p.txt", "-o", tmp_path / "p.csv", "-o", tmp_path / "p.npy",
+    program("match", source, target, "-o", tmp_path / "p.txt", "-o", tmp_path / "p.csv", "-o", tmp_path / "p.npy", "-o", tmp_path / "p.npz",
             "--save-functional-map", tmp_path / "c.npy")  # fmt: skip
-    for extension in ["txt", "csv", "npy"]:
+    for extension in ["txt", "csv", "npy", "npz"]:
         match.save(tmp_path / f"m.{extension}")
         assert (tmp_path / f"m.{extension}").read_bytes() == (tmp_path / f"p.{extension}").read_bytes()
     np.testing.assert_array_equal(match.functional_map, np.load(tmp_path / "c.npy"))
@@ -34,6 +34,8 @@ def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
         dict(fm="bidirectional", mask_weight=0.1, refine="none"),
         dict(decimate=1000, upscale="least-squares", effort="low"),
         dict(decimate=1000),
+        dict(adapt=2, backend="native"),
+        dict(backend="tract"),
         dict(decimate="off", refine="icp"),
     ],
     ids=str,
