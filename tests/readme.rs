@@ -107,6 +107,8 @@ fn execute(work: &Workplace, words: &Words) -> bool {
     let mut command = match words[0].as_str() {
         "fmnet-infer" => infer(),
         "fmnet-train" => train(),
+        // Its own tests run them, in an environment that has the package (python/tests).
+        "python" if uses_package(&words[1]) => return false,
         "python" => match python() {
             Some(python) => Command::new(python),
             None => return false,
@@ -131,6 +133,11 @@ fn execute(work: &Workplace, words: &Words) -> bool {
     command.args(&rest).args(shortened(&words[0], name)).current_dir(work.folder());
     run(&mut command).unwrap_or_else(|e| panic!("{}: {e}", words.join(" ")));
     true
+}
+
+/// Whether a script, which has to be there, imports the package `fmnet`.
+fn uses_package(script: &str) -> bool {
+    std::fs::read_to_string(root().join(script)).is_ok_and(|text| text.contains("\nimport fmnet"))
 }
 
 /// `cargo run` runs the program; of the others (install, test, bench) the paths and names are checked.
@@ -223,6 +230,16 @@ fn every_option_that_a_page_names_exists() {
     known.extend(
         others.into_iter().chain(["meshes", "corres", "nocapture", "open", "dressed"]).map(str::to_string),
     );
+    let declared = |script: PathBuf| {
+        let text = std::fs::read_to_string(script).unwrap();
+        text.split("\"--")
+            .skip(1)
+            .map(|rest| rest.split('"').next().unwrap_or("").to_owned())
+            .collect::<Vec<_>>()
+    };
+    let scripts = files_below(&root().join("examples/python"));
+    let is_script = |path: &PathBuf| path.extension().is_some_and(|e| e == "py");
+    known.extend(scripts.into_iter().filter(is_script).flat_map(declared));
     for page in pages() {
         for option in options(&code(&page)) {
             assert!(known.contains(&option), "{}: no program has an option --{option}", page.display());

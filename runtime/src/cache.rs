@@ -30,13 +30,28 @@ impl CacheKey {
         Self(*hasher.finalize().as_bytes())
     }
 
+    /// The key of these bytes, as [`CacheKey::as_bytes`] gave them.
+    pub(crate) fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
     /// The key as bytes, to derive another key from.
     pub fn as_bytes(&self) -> &[u8; 32] {
         &self.0
     }
 
-    fn to_hex(self) -> String {
-        self.0[..16].iter().map(|b| format!("{b:02x}")).collect()
+    /// The key as 64 hexadecimal digits.
+    pub fn to_hex(self) -> String {
+        self.0.iter().map(|b| format!("{b:02x}")).collect()
+    }
+
+    /// The key of 64 hexadecimal digits, as [`CacheKey::to_hex`] gave them.
+    pub fn from_hex(text: &str) -> Option<Self> {
+        let digits = text.chars().map(|c| c.to_digit(16)).collect::<Option<Vec<u32>>>()?;
+        let bytes: Vec<u8> =
+            digits.chunks(2).map(|pair| pair.iter().fold(0, |byte, &d| byte * 16 + d as u8)).collect();
+        (digits.len() == 64).then_some(())?;
+        Some(Self(bytes.try_into().ok()?))
     }
 }
 
@@ -69,7 +84,7 @@ impl Cache {
 
     /// The file of an entry; `kind` says what it holds, for people who look at the folder.
     pub fn path(&self, kind: &str, key: CacheKey) -> PathBuf {
-        self.folder.join(format!("{kind}-{}.fmc", key.to_hex()))
+        self.folder.join(format!("{kind}-{}.fmc", &key.to_hex()[..32]))
     }
 
     /// Reads an entry.
@@ -232,6 +247,14 @@ mod tests {
     #[test]
     fn another_split_of_the_same_bytes_is_another_key() {
         assert_ne!(CacheKey::of(&[b"ab", b"c"]), CacheKey::of(&[b"a", b"bc"]));
+    }
+
+    #[test]
+    fn a_key_comes_back_from_its_digits() {
+        let key = CacheKey::of(&[b"mesh"]);
+        assert_eq!(CacheKey::from_hex(&key.to_hex()), Some(key));
+        assert_eq!(CacheKey::from_hex(&key.to_hex()[..63]), None);
+        assert_eq!(CacheKey::from_hex(&"g".repeat(64)), None);
     }
 
     #[test]

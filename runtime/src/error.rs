@@ -70,6 +70,14 @@ pub enum Error {
     /// Spectral ICP of a part: its maps preserve areas, and those of a part to its whole do not.
     #[error("spectral ICP is for whole shapes only; refine the map of a part with --refine zoomout")]
     IcpOfPart,
+    /// A shape was described by another matcher's model, back-end or settings of SHOT.
+    #[error(
+        "{shape} was described by another model or other settings of SHOT than those of this matcher; describe it again by this matcher"
+    )]
+    OtherDescriptor {
+        /// The name of the shape.
+        shape: String,
+    },
     /// Any of these, on a known shape or pair.
     #[error("{shape}: {source}")]
     InShape {

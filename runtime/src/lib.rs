@@ -51,7 +51,7 @@
 //! | evaluation | [`eval`], [`geodesic`] | geodesic errors and curves; exact distances |
 //! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |
 //!
-//! [`pipeline`] knows their order, [`shape`] what is computed of one shape; [`cache`] keeps it in a folder, [`memory`] refuses what
+//! [`pipeline`] knows their order, [`batch`] the files of many pairs, [`shape`] what is computed of one shape; [`cache`] keeps it in a folder, [`memory`] refuses what
 //! would not fit, [`events`] tell how far it is.
 //!
 //! # Conventions
@@ -69,6 +69,7 @@
 //! `tract` (default) runs networks in pure Rust; `ort` runs them by onnxruntime, whose library is loaded from the path in
 //! `ORT_DYLIB_PATH`. Without either, SHOT descriptors still match.
 
+pub mod batch;
 pub mod cache;
 pub mod descriptor;
 pub mod diffusion_net;

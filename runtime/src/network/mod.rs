@@ -161,6 +161,11 @@ impl DescriptorNetwork {
         Ok(Self { path: path.to_path_buf(), contract, fingerprint, backend, engine, native })
     }
 
+    /// The model file, or what stands for it in messages.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// What travels with the model.
     pub fn metadata(&self) -> &ModelMetadata {
         &self.contract.metadata

@@ -15,6 +15,9 @@ pub trait Descriptor: Send + Sync {
     /// Eigenpairs that it needs of a shape, 0 where none.
     fn eigenpairs(&self) -> usize;
 
+    /// Its settings as bytes, which tell it from every other of its kind.
+    fn settings(&self) -> Vec<u8>;
+
     /// A value for each vertex of [`Shape::mesh`], `[n, d]`. Quantities are taken from the shape, which computes those that
     /// are asked for.
     ///
@@ -27,6 +30,10 @@ pub trait Descriptor: Send + Sync {
 impl Descriptor for ShotOptions {
     fn eigenpairs(&self) -> usize {
         0
+    }
+
+    fn settings(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
     }
 
     fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error> {
@@ -51,11 +58,14 @@ impl Descriptor for NetworkDescriptor {
         self.network.contract().eigenpairs()
     }
 
-    fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error> {
+    fn settings(&self) -> Vec<u8> {
         let backend = self.network.backend().to_string();
         let shot = serde_json::to_vec(&self.shot).unwrap_or_default();
-        let options = [self.network.fingerprint().as_slice(), backend.as_bytes(), &shot].concat();
-        let key: CacheKey = shape.quantity_key("descriptors", INPUTS_VERSION, &options);
+        [self.network.fingerprint().as_slice(), backend.as_bytes(), &shot].concat()
+    }
+
+    fn describe(&self, shape: &Shape, context: Context) -> Result<Matrix<f32>, Error> {
+        let key: CacheKey = shape.quantity_key("descriptors", INPUTS_VERSION, &self.settings());
         let found = context.cache.and_then(|cache| cache.fetch("descriptors", key, context.observer));
         if let Some(descriptors) = found
             .and_then(|bytes| Decoder::new(&bytes).matrix())

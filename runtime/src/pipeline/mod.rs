@@ -13,13 +13,14 @@
 mod adapt;
 mod candidates;
 mod describe_pair;
+mod described;
 mod descriptor;
 mod finish;
 mod landmarks;
 mod options;
 mod pair;
 
-use crate::cache::Cache;
+use crate::cache::{Cache, CacheKey};
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
 use crate::events::{Event, Observer};
@@ -36,6 +37,7 @@ use std::path::Path;
 
 pub use candidates::Candidate;
 pub use describe_pair::Named;
+pub use described::DescribedShape;
 pub use descriptor::{Descriptor, NetworkDescriptor};
 pub use landmarks::LandmarkError;
 pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
@@ -46,17 +48,6 @@ const SHOT_K: usize = 120;
 const SPARSE: usize = 2000;
 /// The model that is built into the library.
 const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
-
-/// A shape with its descriptors.
-#[derive(Clone, Debug)]
-pub struct DescribedShape {
-    /// The processed shape.
-    pub shape: Shape,
-    /// Descriptors of its working mesh, `[n, d]`.
-    pub descriptors: Matrix<f32>,
-    /// Eigenfunctions that refinement uses: small meshes do not have so many as it would like.
-    refined_k: usize,
-}
 
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -195,6 +186,29 @@ impl Matcher {
         }
     }
 
+    /// What tells descriptors of this matcher from those of another: its model, back-end and settings of SHOT.
+    pub fn descriptor_key(&self) -> CacheKey {
+        let kind: &[u8] = if self.network.is_some() { b"network" } else { b"shot" };
+        CacheKey::of(&[kind, &self.descriptor().settings()])
+    }
+
+    /// Whether a shape, which may come from a file, has descriptors as this matcher makes them.
+    ///
+    /// # Errors
+    /// If it was described by another model, back-end or settings of SHOT.
+    pub fn check(&self, shape: &DescribedShape) -> Result<(), Error> {
+        match shape.described_by == self.descriptor_key() {
+            true => Ok(()),
+            false => Err(Error::OtherDescriptor { shape: shape.shape.name.clone() }),
+        }
+    }
+
+    /// Eigenfunctions that refinement uses of a shape: small meshes do not have so many as it would like.
+    fn refined_k(&self, shape: &Shape) -> usize {
+        let wanted = self.refinement(shape.whole_area.is_some()).eigenpairs(self.k);
+        wanted.min((shape.n() / 4).max(self.k))
+    }
+
     /// The matcher's cache, and who is told.
     pub fn context<'a>(&'a self, observer: Observer<'a>) -> Context<'a> {
         Context { cache: self.cache.as_ref(), observer }
@@ -247,9 +261,6 @@ impl Matcher {
             )));
         }
         let shape = Shape::new(name, mesh, options, context)?;
-        let wanted = self.refinement(options.whole_area.is_some()).eigenpairs(self.k);
-        // Small meshes do not have so many eigenfunctions as refinement would like.
-        let refined_k = wanted.min((shape.n() / 4).max(self.k));
         let described_k = self.descriptor().eigenpairs();
         if described_k > shape.max_eigenpairs() {
             observer(Event::Warning(format!(
@@ -258,18 +269,18 @@ impl Matcher {
             )));
         }
         // Asked for once at its largest, the eigenbasis serves every smaller one.
-        shape.eigenbasis(refined_k.max(described_k.min(shape.max_eigenpairs())), context)?;
+        shape.eigenbasis(self.refined_k(&shape).max(described_k.min(shape.max_eigenpairs())), context)?;
         let descriptors = self.descriptor().describe(&shape, context)?;
-        Ok(DescribedShape { shape, descriptors, refined_k })
+        Ok(DescribedShape { shape, descriptors, described_by: self.descriptor_key() })
     }
 
     /// Computes the map of a pair, from the source to the target; that of a part to its whole where the source was
     /// described as one.
     ///
     /// # Errors
-    /// If the target is a part, the descriptors are of different models or not finite, a shape has too few eigenfunctions, a
-    /// stage would take more memory than there is, the refinement fails, or the matches are too few to be upscaled; it names the
-    /// shape or the pair.
+    /// If the target is a part, a shape was described by another model or other settings, the descriptors are not finite, a shape
+    /// has too few eigenfunctions, a stage would take more memory than there is, the refinement fails, or the matches are too few to
+    /// be upscaled; it names the shape or the pair.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
@@ -292,6 +303,10 @@ impl Matcher {
         observer: Observer,
     ) -> Result<Match, Error> {
         let names = format!("{} -> {}", source.shape.name, target.shape.name);
+        [source, target]
+            .into_iter()
+            .try_for_each(|shape| self.check(shape))
+            .map_err(|e| e.in_shape(&names))?;
         let pair = Pair { matcher: self, source, target, names: &names, context: self.context(observer) };
         pair.run(landmarks).map_err(|e| e.in_shape(&names))
     }

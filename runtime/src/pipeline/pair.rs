@@ -153,7 +153,7 @@ impl Pair<'_> {
 
     /// Eigenfunctions that refinement goes up to.
     pub(super) fn refined_k(&self) -> usize {
-        self.source.refined_k.min(self.target.refined_k)
+        self.matcher.refined_k(&self.source.shape).min(self.matcher.refined_k(&self.target.shape))
     }
 
     /// The functional maps that take the descriptors of both shapes to each other, and the landmarks.

@@ -7,6 +7,7 @@
 
 mod pieces;
 pub mod quantities;
+mod saved;
 mod way_back;
 
 use crate::cache::{Cache, CacheKey, Decoder, Encoder};

@@ -30,8 +30,8 @@ const GRADIENTS_VERSION: u32 = 1;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Store {
     laplacian: Option<Arc<Laplacian>>,
-    eigenbasis: Option<Arc<Eigenbasis>>,
-    full_basis: Option<Arc<Eigenbasis>>,
+    pub(super) eigenbasis: Option<Arc<Eigenbasis>>,
+    pub(super) full_basis: Option<Arc<Eigenbasis>>,
     gradients: Option<Arc<EigenGradients>>,
     shot: Vec<(ShotOptions, Arc<Matrix<f32>>)>,
 }
@@ -211,7 +211,7 @@ impl Shape {
         }
         let basis = compute()?;
         let mut out = Encoder::default();
-        out.slice(&basis.eigenvalues).slice(&basis.mass).matrix(&basis.eigenvectors);
+        encode_basis(&mut out, &basis);
         self.keep(kind, key, &out.finish(), context)?;
         Ok(Arc::new(basis))
     }
@@ -260,7 +260,11 @@ impl Shape {
     }
 }
 
-fn decode_basis(bytes: &[u8]) -> Option<Eigenbasis> {
+pub(super) fn encode_basis(out: &mut Encoder, basis: &Eigenbasis) {
+    out.slice(&basis.eigenvalues).slice(&basis.mass).matrix(&basis.eigenvectors);
+}
+
+pub(super) fn decode_basis(bytes: &[u8]) -> Option<Eigenbasis> {
     let mut input = Decoder::new(bytes);
     let basis =
         Eigenbasis { eigenvalues: input.slice()?, mass: input.slice()?, eigenvectors: input.matrix()? };

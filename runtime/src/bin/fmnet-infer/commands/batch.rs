@@ -1,16 +1,16 @@
 //! `fmnet-infer batch`: many pairs, each shape processed once.
 
-use super::map_key::{Made, MapKeys, forget_key, made_from, write_key};
 use super::matching::{quality, read};
 use super::output::{Inputs, create_folder, file_name};
-use super::pairs::{Pair, read_pairs};
 use crate::args::BatchArgs;
 use crate::console::{Console, shown};
 use anyhow::{Result, bail};
+use fmnet::batch::{Made, MapKeys, Pair, decode_pairs, made_from, read_pairs, write_map};
 use fmnet::causes;
-use fmnet::io::write_point_map;
+use fmnet::io::IoError;
 use fmnet::pipeline::{DescribedShape, Match, MatchOptions, Matcher};
 use serde_json::{Value, json};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use std::sync::Arc;
 const KEPT_SHAPES: usize = 8;
 
 pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
-    let pairs = read_pairs(args)?;
+    let pairs = pairs(args)?;
     create_folder(&args.out)?;
     let options = args.pipeline.to_options();
     let cache = options.cache.clone().unwrap_or_else(|| args.out.join("cache"));
@@ -29,7 +29,7 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     let (mut done, mut renewed, mut skipped, mut failures) = (0, 0, 0, Vec::new());
     let (mut maps, mut doubtful) = (Vec::new(), 0);
     for (number, pair) in pairs.iter().enumerate() {
-        let outcome = keys.of(pair).and_then(|key| match made_from(&pair.out) {
+        let outcome = keys.of(pair).map_err(anyhow::Error::from).and_then(|key| match made_from(&pair.out) {
             Made::From(old) if old == key => Ok(Outcome::Kept),
             made => {
                 let result = match_pair(pair, &key, args.partial, &mut shapes, console)?;
@@ -82,6 +82,18 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     Ok(())
 }
 
+/// The pairs of the list, which may be standard input.
+fn pairs(args: &BatchArgs) -> Result<Vec<Pair>> {
+    let (root, out) = (args.root.as_deref(), args.out.as_path());
+    if args.pairs.as_os_str() != "-" {
+        return Ok(read_pairs(&args.pairs, root, out, &args.format)?);
+    }
+    let mut bytes = Vec::new();
+    let read = std::io::stdin().read_to_end(&mut bytes);
+    read.map_err(|source| IoError::Read { path: args.pairs.clone(), source })?;
+    Ok(decode_pairs(&bytes, &args.pairs, root, out, &args.format)?)
+}
+
 enum Outcome {
     Kept,
     /// Made now, in place of an older one or for the first time.
@@ -105,10 +117,7 @@ fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, consol
     let whole_area = partial.then(|| target.shape.full_mesh.area());
     let source = shapes.get(&pair.source, whole_area, console)?;
     let result = shapes.matcher.match_shapes(&source, &target, &|event| console.event(event))?;
-    // Without its key a map is made anew, so it never stands beside the key of another one.
-    forget_key(&pair.out)?;
-    write_point_map(&pair.out, &result.map)?;
-    write_key(&pair.out, key)?;
+    write_map(&pair.out, &result.map, key)?;
     Ok(result)
 }
 

@@ -5,10 +5,8 @@ pub(crate) mod demo;
 pub(crate) mod evaluate;
 pub(crate) mod features;
 pub(crate) mod inspect;
-mod map_key;
 pub(crate) mod matching;
 mod output;
-mod pairs;
 pub(crate) mod transfer;
 mod values;
 

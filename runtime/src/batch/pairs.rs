@@ -1,64 +1,108 @@
 //! The list of pairs that `batch` matches, and the names of their maps.
 
-use crate::args::BatchArgs;
-use anyhow::{Result, bail};
-use fmnet::io::{IoError, decode_text, path_from_bytes};
+use crate::io::{IoError, Position, decode_text, path_from_bytes};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
-use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use thiserror::Error;
 
 /// Two meshes, and where their map goes.
-#[derive(Debug)]
-pub(super) struct Pair {
-    pub(super) source: PathBuf,
-    pub(super) target: PathBuf,
-    pub(super) out: PathBuf,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// The source mesh.
+    pub source: PathBuf,
+    /// The target mesh.
+    pub target: PathBuf,
+    /// The file of the map.
+    pub out: PathBuf,
+}
+
+/// Why a list of pairs cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PairsError {
+    /// The list cannot be read, or a line is no pair.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// The folder of the meshes is none.
+    #[error("{}: there is no such folder; name the one that the meshes of the list are in", root.display())]
+    NoFolder {
+        /// The folder.
+        root: PathBuf,
+    },
+    /// Two pairs would write the same file.
+    #[error(
+        "{} -> {} and {} -> {} would both be written to {}; give the files different names",
+        first.source.display(), first.target.display(), second.source.display(), second.target.display(), first.out.display()
+    )]
+    SameOut {
+        /// The one pair.
+        first: Box<Pair>,
+        /// The other.
+        second: Box<Pair>,
+    },
 }
 
 /// Two names of a line.
 type Names<'a> = [&'a [u8]; 2];
 
-/// Reads the list; refuses one of which two pairs would write the same file.
-pub(super) fn read_pairs(args: &BatchArgs) -> Result<Vec<Pair>> {
-    let bytes = read_list(&args.pairs)?;
-    let beside = args.pairs.parent().unwrap_or(Path::new(""));
-    let root = args.root.as_deref().unwrap_or(beside);
+/// Reads a list of pairs, one a line; their maps are `SOURCE__TARGET.EXTENSION` in the folder `out`. Mesh files are relative to `root`,
+/// by default the folder of the list.
+///
+/// # Errors
+/// If the list cannot be read, a line is no pair, `root` is no folder, or two pairs would write the same file.
+pub fn read_pairs(
+    list: &Path,
+    root: Option<&Path>,
+    out: &Path,
+    extension: &str,
+) -> Result<Vec<Pair>, PairsError> {
+    let bytes = std::fs::read(list).map_err(|source| IoError::Read { path: list.into(), source })?;
+    decode_pairs(&bytes, list, root, out, extension)
+}
+
+/// [`read_pairs`] of bytes at hand; `list` is their name in errors, and its folder that of the meshes where `root` is none.
+///
+/// # Errors
+/// As [`read_pairs`].
+pub fn decode_pairs(
+    bytes: &[u8],
+    list: &Path,
+    root: Option<&Path>,
+    out: &Path,
+    extension: &str,
+) -> Result<Vec<Pair>, PairsError> {
+    let root = root.unwrap_or(list.parent().unwrap_or(Path::new("")));
     if !root.as_os_str().is_empty() && !root.is_dir() {
-        bail!("{}: there is no such folder; name the one that the meshes of the list are in", root.display());
+        return Err(PairsError::NoFolder { root: root.into() });
     }
     let mut named = Vec::new();
-    for (number, line) in decode_text(&bytes).split(|&b| b == b'\n' || b == b'\r').enumerate() {
+    for (number, line) in decode_text(bytes).split(|&b| b == b'\n' || b == b'\r').enumerate() {
         let line = line.trim_ascii();
         match names(line, |name| file_of(root, name).is_file()) {
             Some(names) => named.push(names.map(|name| file_of(Path::new(""), name))),
             None if line.is_empty() || line.starts_with(b"#") => {}
-            None => bail!(
-                "{}, line {}: expected two mesh files, found {:?}; put names that contain spaces in quotes, or a tab between them",
-                args.pairs.display(),
-                number + 1,
-                String::from_utf8_lossy(line)
-            ),
+            None => {
+                let malformed = IoError::Malformed {
+                    path: list.into(),
+                    at: Position::Line(number + 1),
+                    problem: format!("expected two mesh files, found {:?}", String::from_utf8_lossy(line)),
+                    remedy: "put names that contain spaces in quotes, or a tab between them".into(),
+                };
+                return Err(malformed.into());
+            }
         }
     }
-    let outs = out_names(&named, &args.format);
+    let outs = out_names(&named, extension);
+    let folder = out;
     let pair = |([source, target], out): ([PathBuf; 2], OsString)| Pair {
         source: root.join(source),
         target: root.join(target),
-        out: args.out.join(out),
+        out: folder.join(out),
     };
     let pairs: Vec<Pair> = named.into_iter().zip(outs).map(pair).collect();
     check_names(&pairs)?;
     Ok(pairs)
-}
-
-fn read_list(path: &Path) -> Result<Vec<u8>, IoError> {
-    let mut bytes = Vec::new();
-    let read = match path.as_os_str() == "-" {
-        true => std::io::stdin().read_to_end(&mut bytes).map(|_| bytes),
-        false => std::fs::read(path),
-    };
-    read.map_err(|source| IoError::Read { path: path.into(), source })
 }
 
 /// The file of a name, which may be written as another system does.
@@ -157,20 +201,16 @@ fn whole(path: &Path) -> OsString {
 }
 
 /// Two pairs must not write the same file.
-fn check_names(pairs: &[Pair]) -> Result<()> {
+fn check_names(pairs: &[Pair]) -> Result<(), PairsError> {
     let mut seen: BTreeMap<&Path, &Pair> = BTreeMap::new();
     for pair in pairs {
         if let Some(other) = seen.insert(&pair.out, pair)
             && (&other.source, &other.target) != (&pair.source, &pair.target)
         {
-            bail!(
-                "{} -> {} and {} -> {} would both be written to {}; give the files different names",
-                other.source.display(),
-                other.target.display(),
-                pair.source.display(),
-                pair.target.display(),
-                pair.out.display()
-            );
+            return Err(PairsError::SameOut {
+                first: Box::new(other.clone()),
+                second: Box::new(pair.clone()),
+            });
         }
     }
     Ok(())

@@ -1,0 +1,97 @@
+//! Errors and warnings as Python knows them: what the system refused is an `OSError`, everything else `fmnet.Error`, a `ValueError`.
+
+use fmnet::io::IoError;
+use fmnet::network::NetworkError;
+use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use std::path::Path;
+
+pyo3::create_exception!(
+    fmnet,
+    Error,
+    PyValueError,
+    "What fmnet was given is wrong, or cannot be computed; says which element and what to do."
+);
+pyo3::create_exception!(
+    fmnet,
+    FmnetWarning,
+    PyUserWarning,
+    "Something about a mesh or a map that the user should know; the computation goes on."
+);
+
+/// What went wrong away from the interpreter.
+pub(crate) enum Failure {
+    Library(fmnet::Error),
+    /// In words.
+    Said(String),
+}
+
+impl<E: Into<fmnet::Error>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Library(error.into())
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Library(error) => of_library(&error),
+            Failure::Said(text) => Error::new_err(text),
+        }
+    }
+}
+
+fn of_library(error: &fmnet::Error) -> PyErr {
+    match innermost(error) {
+        fmnet::Error::Io(io) => of_io(io).unwrap_or_else(|| Error::new_err(error.to_string())),
+        fmnet::Error::Network(NetworkError::Read { path, .. }) => match std::fs::metadata(path) {
+            Err(source) => system_error(path, &source),
+            Ok(_) => PyOSError::new_err(error.to_string()),
+        },
+        _ => Error::new_err(error.to_string()),
+    }
+}
+
+fn innermost(error: &fmnet::Error) -> &fmnet::Error {
+    match error {
+        fmnet::Error::InShape { source, .. } => innermost(source),
+        other => other,
+    }
+}
+
+/// The `OSError` of what the system refused; its number makes it a `FileNotFoundError` and so on.
+fn of_io(error: &IoError) -> Option<PyErr> {
+    let (IoError::Read { path, source } | IoError::Write { path, source }) = error else { return None };
+    Some(system_error(path, source))
+}
+
+fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
+    match source.raw_os_error() {
+        Some(number) => {
+            let text = source.to_string().replace(&format!(" (os error {number})"), "");
+            PyOSError::new_err((number, text, path.display().to_string()))
+        }
+        None => PyOSError::new_err(format!("{}: {source}", path.display())),
+    }
+}
+
+/// The error of a file.
+pub(crate) fn io_error(error: IoError) -> PyErr {
+    Failure::from(error).into()
+}
+
+/// An `fmnet.Error` of anything that says what is wrong.
+pub(crate) fn wrong(error: impl std::fmt::Display) -> PyErr {
+    Error::new_err(error.to_string())
+}
+
+/// As [`wrong`], away from the interpreter.
+pub(crate) fn said(error: impl std::fmt::Display) -> Failure {
+    Failure::Said(error.to_string())
+}
+
+/// A Python warning, at the line of the caller.
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = std::ffi::CString::new(text.replace('\0', " ")).map_err(wrong)?;
+    PyErr::warn(py, &py.get_type::<FmnetWarning>(), &text, 1)
+}
