@@ -129,6 +129,9 @@ fn execute(work: &Workplace, words: &Words) -> bool {
     if words.iter().any(|w| w == "pairs.txt") {
         std::fs::write(work.path("pairs.txt"), "a.ply b.ply\n").unwrap();
     }
+    if words.iter().any(|w| w == "landmarks.txt") {
+        std::fs::write(work.path("landmarks.txt"), "0 0\n200 200\n").unwrap();
+    }
     let name = rest.first().map_or("", String::as_str);
     command.args(&rest).args(shortened(&words[0], name)).current_dir(work.folder());
     run(&mut command).unwrap_or_else(|e| panic!("{}: {e}", words.join(" ")));
@@ -205,7 +208,7 @@ fn every_option_that_a_page_names_exists() {
     for command in ["demo", "match", "batch", "transfer", "features", "evaluate", "inspect"] {
         known.extend(help(infer(), &[command, "--help"]));
     }
-    for command in ["synth", "preprocess", "train", "export", "evaluate", "reproduce", "simulate"] {
+    for command in ["synth", "preprocess", "train", "calibrate", "export", "evaluate", "reproduce", "simulate"] {
         known.extend(help(train(), &[command, "--help"]));
     }
     for kind in ["parts", "scans", "triangulations"] {

@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 /// Steps of the adaptation of a doubtful pair.
 const ADAPTATION: usize = 10;
 
+/// Probability that the first map is bad from which the cheapest other one is tried.
+const WORTH_A_TRY: f64 = 0.2;
+
 /// A map before refinement, both ways.
 pub(super) struct Start {
     pub(super) functional_map: Matrix,
@@ -75,16 +78,21 @@ impl Pair<'_> {
     ) -> Result<Tried, Error> {
         let judged = judge.judge(&found)?;
         let mut tried = Tried::first("default", found, judged);
-        let wanted = match self.matcher.effort {
-            Effort::Low => false,
-            Effort::Normal => tried.estimate.doubtful || self.matcher.adapt.is_some_and(|steps| steps > 0),
-            Effort::High => true,
-        };
         // Other refinements were asked for by name, and a part has no map back.
-        if !wanted || self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
+        if self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
             return Ok(tried);
         }
-        self.try_others(judge, start, &mut tried, landmarks)?;
+        let all = self.matcher.effort == Effort::High || self.matcher.adapt.is_some_and(|steps| steps > 0);
+        let more = self.matcher.effort != Effort::Low;
+        if all || more && tried.estimate.bad > WORTH_A_TRY {
+            let rough = WaveletOptions::coarse_to_fine(self.matcher.k, self.refined_k());
+            let found = self.wavelet(start, &rough)?;
+            let judged = judge.judge(&found)?;
+            tried.add("coarse to fine", found, judged);
+        }
+        if all || more && tried.estimate.doubtful {
+            self.try_others(judge, start, &mut tried, landmarks)?;
+        }
         Ok(tried)
     }
 
@@ -103,7 +111,6 @@ impl Pair<'_> {
             tried.add(name, found, judged);
             Ok(())
         };
-        attempt("coarse to fine", self.wavelet(start, &rough))?;
         let features = Start { anchors: start.anchors.clone(), ..self.by_features()? };
         attempt("features alone", self.refine(Refinement::Wavelet, &features))?;
         attempt("features alone, coarse to fine", self.wavelet(&features, &rough))?;
