@@ -27,7 +27,7 @@ pub struct WaveletStage {
 /// Options of [`wavelet`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveletOptions {
-    /// One after the other. At least one; default 3 rounds at 200 eigenfunctions.
+    /// One after the other. At least one; default 5 rounds at 200 eigenfunctions.
     pub stages: Vec<WaveletStage>,
     /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: what is known
     /// beforehand, such as landmarks. Default none.
@@ -50,9 +50,9 @@ impl Default for WaveletOptions {
 }
 
 impl WaveletOptions {
-    /// Three rounds at `k` eigenfunctions: for a start that is right up to details.
+    /// Five rounds at `k` eigenfunctions: for a start that is right up to details.
     pub fn at(k: usize) -> Self {
-        Self { stages: vec![WaveletStage { k, rounds: 3 }], anchors: None, part: false }
+        Self { stages: vec![WaveletStage { k, rounds: 5 }], anchors: None, part: false }
     }
 
     /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 5 rounds at 60, 3 at 128, 2 at 200. For a start of

@@ -142,7 +142,7 @@ fn options_out_of_range_and_parts_are_errors() {
         assert!(matches!(wavelet(maps, &basis, &basis, &default), Err(RefineError::Fmap(_))));
     }
     let clamped = refined(&[map.clone(), map.clone()], [&basis, &basis], &default);
-    assert_eq!(clamped.info.rounds, [10; 3]);
+    assert_eq!(clamped.info.rounds, [10; 5]);
 }
 
 #[test]
