@@ -1,5 +1,5 @@
-//! Synthetic bodies: articulated bipeds and quadrupeds of several species, in random shapes and poses, with exact
-//! correspondences. They train the model that needs no licensed data.
+//! Synthetic bodies: articulated bipeds, quadrupeds, hands, birds, fish and insects of several species, in random shapes and poses,
+//! with exact correspondences. They train the model that needs no licensed data.
 //!
 //! A breed of a species is modelled at rest as an implicit surface ([`Species`]), polygonised ([`Template`]) and deformed
 //! into individuals ([`Template::body`]): bones are lengthened and thickened, flesh is added, and dual quaternion
@@ -11,6 +11,7 @@ mod adjacency;
 mod biped;
 mod bird;
 mod body;
+mod bones;
 mod carry;
 mod collision;
 mod correspond;

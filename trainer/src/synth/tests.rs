@@ -1,5 +1,6 @@
 use std::collections::HashMap;
 
+use super::implicit::Part;
 use super::math::Vec3;
 use super::mirror::{Symmetry, mirrored, pair_up};
 use super::template::Stance;
@@ -67,6 +68,28 @@ fn names_of_species_are_their_own() {
         let large = [Family::Biped, Family::Quadruped].contains(&family);
         assert_eq!(held_out, usize::from(large), "{}", family.name());
         assert!(family.species().count() >= if large { 14 } else { 6 });
+    }
+}
+
+/// Landmarks are carried from a part of the base to the part with the same number.
+#[test]
+fn first_parts_of_every_breed_are_those_of_the_base() {
+    for family in Family::ALL {
+        let base = (family.plan().base)();
+        for species in family.species() {
+            for breed in 0..4 {
+                let name = format!("{} {breed}", species.name());
+                let recipe = species.recipe(breed, 0);
+                assert!(recipe.parts.len() >= base.parts.len(), "{name} lacks parts");
+                for (i, (a, b)) in base.parts.iter().zip(&recipe.parts).enumerate() {
+                    let kind = |part: &Part| std::mem::discriminant(&part.solid);
+                    let same = a.bones == b.bones && a.carve == b.carve && kind(a) == kind(b);
+                    assert!(same, "{name}: part {i} is another one than the base's");
+                }
+                assert!(recipe.skeleton.len() == base.skeleton.len(), "{name} has other bones");
+                assert_eq!(recipe.magnified.len(), base.skeleton.len(), "{name}");
+            }
+        }
     }
 }
 

@@ -4,10 +4,12 @@
 
 use outfit::Outfit;
 
+mod extras;
 mod head;
 mod limbs;
 mod outfit;
 mod species;
+mod stylise;
 mod trunk;
 
 use super::math::Vec3;
@@ -18,32 +20,12 @@ use super::recipe::Recipe;
 use super::species::Plan;
 use fmnet::mesh::vec3;
 
-/// Indices of the bones of a biped. Those of a limb are offsets to be passed to [`limb`].
+/// Indices of the bones of a biped. Those of a side are to be passed to [`bone::limb`].
 pub(in crate::synth) mod bone {
-    pub(in crate::synth) const PELVIS: usize = 0;
-    pub(in crate::synth) const LUMBAR: usize = 1;
-    pub(in crate::synth) const CHEST: usize = 2;
-    pub(in crate::synth) const NECK: usize = 3;
-    pub(in crate::synth) const HEAD: usize = 4;
-    pub(in crate::synth) const CLAVICLE: usize = 5;
-    pub(in crate::synth) const UPPER_ARM: usize = 6;
-    pub(in crate::synth) const FOREARM: usize = 7;
-    pub(in crate::synth) const HAND: usize = 8;
-    pub(in crate::synth) const FINGERS: usize = 9;
-    pub(in crate::synth) const THUMB: usize = 10;
-    pub(in crate::synth) const THIGH: usize = 11;
-    pub(in crate::synth) const SHIN: usize = 12;
-    pub(in crate::synth) const FOOT: usize = 13;
-    pub(in crate::synth) const TOES: usize = 14;
-    /// Bones of one side.
-    pub(in crate::synth) const PER_SIDE: usize = 10;
-    /// The first of two bones of the tail.
-    pub(in crate::synth) const TAIL: usize = CLAVICLE + 2 * PER_SIDE;
-    pub(in crate::synth) const COUNT: usize = TAIL + 2;
-
-    /// Bone `name` of the left (`side` 0) or right (1) limb.
-    pub(in crate::synth) fn limb(name: usize, side: usize) -> usize {
-        name + side * PER_SIDE
+    super::super::bones::bones! {
+        PELVIS LUMBAR CHEST NECK HEAD;
+        CLAVICLE UPPER_ARM FOREARM HAND FINGERS THUMB THIGH SHIN FOOT TOES;
+        TAIL TAIL_END
     }
 }
 
@@ -102,6 +84,8 @@ pub(super) static PLAN: Plan = Plan {
         let proportions = species::proportions(breed, rng);
         let dressed = breed.varies && chance(rng, DRESSED);
         let outfit = if dressed { Outfit::random(rng) } else { Outfit::default() };
+        let stylised = breed.varies && chance(rng, STYLISED);
+        let proportions = if stylised { proportions.stylised(rng) } else { proportions };
         recipe(&proportions, &outfit)
     },
     pose: |skeleton, rng| pose::random_biped(skeleton, rng),
@@ -109,7 +93,9 @@ pub(super) static PLAN: Plan = Plan {
 };
 
 /// Share of the breeds that wear something.
-const DRESSED: f64 = 0.18;
+const DRESSED: f64 = 0.3;
+/// Share of the breeds in proportions that nobody has.
+const STYLISED: f64 = 0.15;
 const HEAD_MAGNIFIED: f64 = 1.3;
 const HAND_MAGNIFIED: f64 = 1.65;
 const FOOT_MAGNIFIED: f64 = 1.2;
@@ -177,11 +163,7 @@ impl Sculptor {
             let (head, tail) = (self.tail_axis(from), self.tail_axis(from + 0.5));
             self.recipe.skeleton.add(name, Some(parent), head, tail, 0.3);
         }
-        let name_of = |index: usize| match index {
-            CLAVICLE..TAIL => CLAVICLE + (index - CLAVICLE) % PER_SIDE,
-            _ => index,
-        };
-        self.recipe.magnified = (0..COUNT).map(|index| magnified(name_of(index))).collect();
+        self.recipe.magnified = (0..COUNT).map(|index| magnified(left(index))).collect();
     }
 
     /// Height of a point of the adult body after the trunk and legs are stretched.

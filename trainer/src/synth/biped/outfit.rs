@@ -7,11 +7,16 @@ use super::super::math::{Vec3, lerp};
 use super::super::mirror::on_side;
 use super::super::random::{chance, uniform};
 use super::super::recipe::{Girth, Join};
+use super::extras::Extras;
 use super::{FOOT_MAGNIFIED, HEAD_MAGNIFIED, Sculptor, bone};
 use fmnet::mesh::vec3;
 
 /// Roundness of the ends of garments, relative to their girth.
 const HEM: f64 = 0.12;
+/// Height of the hem of a skirt below which it goes with the shins as well.
+const LONG: f64 = 0.4;
+/// Height of the hem of a shirt below which it goes with the thighs as well, as a coat.
+const COAT: f64 = 0.84;
 
 /// What a biped wears.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,6 +33,7 @@ pub(super) struct Outfit {
     trousers: Option<[f64; 3]>,
     /// Thickness in metres, and height of the shaft relative to the shin.
     shoes: Option<[f64; 2]>,
+    extras: Extras,
 }
 
 impl Outfit {
@@ -46,10 +52,11 @@ impl Outfit {
         Self {
             hair: draw(0.75, &[[0.008, 0.03], [-0.05, 0.2]]).map(two),
             hat: draw(0.2, &[[1.25, 2.0]]).map(|values| values[0]),
-            shirt: draw(shirt, &[[0.008, 0.03], [0.2, 1.6], [0.86, 1.0]]).map(three),
-            skirt: draw(if skirted { 1.0 } else { 0.0 }, &[[0.25, 0.75], [1.1, 2.0]]).map(two),
+            shirt: draw(shirt, &[[0.008, 0.03], [0.2, 1.6], [0.66, 1.0]]).map(three),
+            skirt: draw(if skirted { 1.0 } else { 0.0 }, &[[0.08, 0.75], [1.1, 2.0]]).map(two),
             trousers: draw(trousers, &[[0.008, 0.025], [0.35, 1.0], [0.05, 0.085]]).map(three),
             shoes: draw(0.7, &[[0.006, 0.02], [0.05, 0.6]]).map(two),
+            extras: Extras::random(rng),
         }
     }
 }
@@ -75,6 +82,7 @@ impl Sculptor {
         if let Some(brim) = outfit.hat {
             self.hat(brim);
         }
+        self.adorn(&outfit.extras);
     }
 
     fn hair(&mut self, [volume, fall]: [f64; 2]) {
@@ -113,17 +121,25 @@ impl Sculptor {
         use bone::*;
         let to = self.to;
         let belly = to.belly;
+        // A coat is wider the longer it is.
+        let fall = 0.25 * (0.86 - hem).max(0.0);
         let waist = [0.142 * to.waist, 0.1 * to.waist + belly, 0.086 * to.waist];
         let chest = [0.16 * to.chest, 0.115 * to.chest + 0.9 * to.breast, 0.112 * to.chest];
         let sections = [
-            [hem, 0.165 * to.hips, 0.1 + 0.5 * belly, 0.105 * to.buttocks],
+            [hem, 0.165 * to.hips + fall, 0.1 + 0.5 * belly + fall, 0.105 * to.buttocks + fall],
             [1.06, waist[0], waist[1], waist[2]],
             [1.2, 0.5 * (waist[0] + chest[0]), 0.5 * (waist[1] + chest[1]), 0.5 * (waist[2] + chest[2])],
             [1.31, chest[0], chest[1], chest[2]],
             [1.4, 0.135 * to.chest, 0.08 * to.chest, 0.11 * to.chest],
             [1.455, 0.07 * to.neck, 0.035 * to.neck, 0.1 * to.neck],
         ];
-        self.garment(&[PELVIS, LUMBAR, CHEST], &sections, loose);
+        let mut bones = vec![PELVIS, LUMBAR, CHEST];
+        if hem < COAT {
+            let thighs = [limb(THIGH, 0), limb(THIGH, 1)];
+            bones.extend(thighs);
+            self.recipe.bound.extend(thighs);
+        }
+        self.garment(&bones, &sections, loose);
         for side in 0..2 {
             let on = |p: Vec3| on_side(p, side);
             let (shoulder, elbow, wrist) = (self.shoulder(), self.elbow(), self.wrist());
@@ -157,9 +173,12 @@ impl Sculptor {
             [0.92, wide, deep + 0.4 * to.belly, deep],
             [1.07, 0.148 * to.waist, 0.1 * to.waist + to.belly, 0.09 * to.waist],
         ];
-        let thighs = [limb(THIGH, 0), limb(THIGH, 1)];
-        self.garment(&[PELVIS, thighs[0], thighs[1]], &sections, 0.008);
-        self.recipe.bound.extend(thighs);
+        let mut bones = vec![PELVIS, limb(THIGH, 0), limb(THIGH, 1)];
+        if hem < LONG {
+            bones.extend([limb(SHIN, 0), limb(SHIN, 1)]);
+        }
+        self.garment(&bones, &sections, 0.008);
+        self.recipe.bound.extend(&bones[1..]);
     }
 
     fn trousers(&mut self, [loose, length, hem]: [f64; 3]) {

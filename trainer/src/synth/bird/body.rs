@@ -40,7 +40,7 @@ impl Sculptor {
         use bone::*;
         let to = self.to;
         let size = HEAD_MAGNIFIED * to.head;
-        let necks = [NECK, NECK + 1, NECK + 2];
+        let necks = [NECK, NECK_MIDDLE, NECK_END];
         // The neck is thick at its base and where it meets the head.
         let thin = 0.034 * to.neck_girth;
         let meets = lerp([0.026 * to.neck_girth, 0.0, 0.0], [0.03 * size, 0.0, 0.0], 0.35)[0];

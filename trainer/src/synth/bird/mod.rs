@@ -24,27 +24,11 @@ pub(super) static PLAN: Plan = Plan {
     rest: |skeleton, rng| pose::resting(skeleton, rng),
 };
 
-/// Indices of the bones of a bird. Those of a limb are offsets to be passed to [`limb`].
+/// Indices of the bones of a bird. Those of a side are to be passed to [`bone::limb`].
 mod bone {
-    pub(super) const PELVIS: usize = 0;
-    pub(super) const CHEST: usize = 1;
-    /// The first of three bones of the neck.
-    pub(super) const NECK: usize = 2;
-    pub(super) const HEAD: usize = 5;
-    pub(super) const TAIL: usize = 6;
-    /// The first of three bones of a wing.
-    pub(super) const WING: usize = 7;
-    pub(super) const THIGH: usize = 10;
-    pub(super) const SHIN: usize = 11;
-    pub(super) const FOOT: usize = 12;
-    pub(super) const TOES: usize = 13;
-    /// Bones of one side.
-    pub(super) const PER_SIDE: usize = 7;
-    pub(super) const COUNT: usize = WING + 2 * PER_SIDE;
-
-    /// Bone `name` of the left (`side` 0) or right (1) limb.
-    pub(super) fn limb(name: usize, side: usize) -> usize {
-        name + side * PER_SIDE
+    super::super::bones::bones! {
+        PELVIS CHEST NECK NECK_MIDDLE NECK_END HEAD TAIL;
+        WING WING_MIDDLE WING_END THIGH SHIN FOOT TOES;
     }
 }
 
@@ -110,8 +94,8 @@ impl Sculptor {
             ("chest", Some(PELVIS), at(0.0, -0.01), at(0.0, 0.09), 1.0),
             ("neck_1", Some(CHEST), self.neck(0.0), self.neck(0.34), 0.7),
             ("neck_2", Some(NECK), self.neck(0.34), self.neck(0.67), 0.7),
-            ("neck_3", Some(NECK + 1), self.neck(0.67), self.neck(1.0), 0.6),
-            ("head", Some(NECK + 2), self.neck(1.0), self.skull([0.0, 0.0, 0.04]), 0.3),
+            ("neck_3", Some(NECK_MIDDLE), self.neck(0.67), self.neck(1.0), 0.6),
+            ("head", Some(NECK_END), self.neck(1.0), self.skull([0.0, 0.0, 0.04]), 0.3),
             ("tail", Some(PELVIS), at(0.01, -0.135), self.tail_tip(), 0.5),
         ];
         self.recipe.skeleton.add_all(&spine);
@@ -120,16 +104,16 @@ impl Sculptor {
         let limbs = [
             ("wing_1", CHEST, shoulder, elbow, 0.6),
             ("wing_2", WING, elbow, wrist, 0.6),
-            ("wing_3", WING + 1, wrist, tip, 0.6),
+            ("wing_3", WING_MIDDLE, wrist, tip, 0.6),
             ("thigh", PELVIS, hip, knee, 0.6),
             ("shin", THIGH, knee, hock, 0.35),
             ("foot", SHIN, hock, ball, 0.12),
             ("toes", FOOT, ball, vec3::add(ball, [0.0, 0.0, 0.04]), 0.12),
         ];
         self.recipe.skeleton.add_pairs(&limbs);
-        let magnified = |index: usize| match index {
+        let magnified = |index: usize| match left(index) {
             HEAD => HEAD_MAGNIFIED,
-            _ if [TOES, TOES + PER_SIDE].contains(&index) => FOOT_MAGNIFIED,
+            TOES => FOOT_MAGNIFIED,
             _ => 1.0,
         };
         self.recipe.magnified = (0..COUNT).map(magnified).collect();

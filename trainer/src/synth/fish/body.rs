@@ -16,7 +16,7 @@ impl Sculptor {
     pub(super) fn trunk(&mut self) {
         use bone::*;
         let to = self.to;
-        let join = Join { bones: &[HEAD, FRONT, MIDDLE, REAR, REAR + 1, REAR + 2], blend: 0.03 };
+        let join = Join { bones: &[HEAD, FRONT, MIDDLE, REAR, REAR_MIDDLE, REAR_END], blend: 0.03 };
         let thin = to.peduncle;
         // Place along the body, half-width, and extents upwards and downwards.
         let sections = [
@@ -44,15 +44,11 @@ impl Sculptor {
         let to = self.to;
         let size = to.head * to.girth.min(to.height);
         let at = |p: Vec3| self.at(p);
-        let (face, nose) = (at([0.0, 0.0, 0.37]), {
-            let [x, y, z] = at([0.0, 0.0, 0.4]);
-            [x, y - 0.008, z + 0.035 * to.snout]
-        });
+        let (face, nose) = (at([0.0, 0.0, 0.37]), self.nose());
         let (jaw, chin) = (at([0.0, -0.028, 0.35]), vec3::add(nose, [0.0, -0.018 * size, -0.012]));
         let eyes = [1.0, -1.0].map(|s| at([s * 0.047 * to.head, 0.022 * to.head, 0.335]));
         let gills = [1.0, -1.0].map(|s| at([s * 0.052 * to.head, -0.012, 0.255]));
         let join = |blend: f64| Join { bones: &[HEAD], blend };
-        let beak = (vec3::add(nose, [0.0, 0.0, -0.02]), vec3::add(nose, [0.0, -0.012, 0.075 * to.beak]));
         let recipe = &mut self.recipe;
         recipe.spindle(join(0.04), face, nose, Girth(0.036 * size, 0.018 * size, 0.0));
         recipe.spindle(join(0.012), jaw, chin, Girth(0.024 * size, 0.012 * size, 0.0));
@@ -60,9 +56,22 @@ impl Sculptor {
             recipe.ellipsoid(join(0.008), eye, vec3::scale([0.01, 0.015, 0.015], to.head));
             recipe.ellipsoid(join(0.012), gill, [0.018 * size, 0.05 * size, 0.03 * to.head]);
         }
-        if to.beak > 0.0 {
-            recipe.spindle(join(0.015), beak.0, beak.1, Girth(0.022 * to.beak, 0.015 * to.beak, 0.0));
+    }
+
+    /// The end of the head, without a beak.
+    fn nose(&self) -> Vec3 {
+        vec3::add(self.at([0.0, 0.0, 0.4]), [0.0, -0.008, 0.035 * self.to.snout])
+    }
+
+    /// The beak of those that have one.
+    pub(super) fn beak(&mut self) {
+        let long = self.to.beak;
+        if long <= 0.0 {
+            return;
         }
+        let ends = [[0.0, 0.0, -0.02], [0.0, -0.012, 0.075 * long]].map(|by| vec3::add(self.nose(), by));
+        let join = Join { bones: &[bone::HEAD], blend: 0.015 };
+        self.recipe.spindle(join, ends[0], ends[1], Girth(0.022 * long, 0.015 * long, 0.0));
     }
 
     /// A fin between its base and its tip.

@@ -22,25 +22,11 @@ pub(super) static PLAN: Plan = Plan {
     rest: |_, rng| pose::resting(rng),
 };
 
-/// Indices of the bones of a fish.
+/// Indices of the bones of a fish. Those of a side are to be passed to [`bone::limb`].
 mod bone {
-    pub(super) const MIDDLE: usize = 0;
-    pub(super) const FRONT: usize = 1;
-    pub(super) const HEAD: usize = 2;
-    /// The first of three bones behind the middle.
-    pub(super) const REAR: usize = 3;
-    pub(super) const TAIL: usize = 6;
-    pub(super) const DORSAL: usize = 7;
-    pub(super) const ANAL: usize = 8;
-    pub(super) const PECTORAL: usize = 9;
-    pub(super) const PELVIC: usize = 10;
-    /// Bones of one side.
-    pub(super) const PER_SIDE: usize = 2;
-    pub(super) const COUNT: usize = PECTORAL + 2 * PER_SIDE;
-
-    /// Bone `name` of the left (`side` 0) or right (1) side.
-    pub(super) fn limb(name: usize, side: usize) -> usize {
-        name + side * PER_SIDE
+    super::super::bones::bones! {
+        MIDDLE FRONT HEAD REAR REAR_MIDDLE REAR_END TAIL DORSAL ANAL;
+        PECTORAL PELVIC;
     }
 }
 
@@ -84,6 +70,7 @@ fn recipe(proportions: &Proportions) -> Recipe {
     sculptor.tail();
     sculptor.upright_fins();
     (0..2).for_each(|side| sculptor.paired_fins(side));
+    sculptor.beak();
     sculptor.fluke();
     sculptor.features();
     sculptor.recipe.scaled(proportions.size)
@@ -105,8 +92,8 @@ impl Sculptor {
             ("head", Some(FRONT), at(0.22), at(0.4), 0.5),
             ("rear_1", Some(MIDDLE), at(-0.05), at(-0.16), 1.0),
             ("rear_2", Some(REAR), at(-0.16), at(-0.26), 1.0),
-            ("rear_3", Some(REAR + 1), at(-0.26), at(-0.36), 1.0),
-            ("tail", Some(REAR + 2), at(-0.36), at(-0.5), 0.6),
+            ("rear_3", Some(REAR_MIDDLE), at(-0.26), at(-0.36), 1.0),
+            ("tail", Some(REAR_END), at(-0.36), at(-0.5), 0.6),
             ("dorsal", Some(MIDDLE), dorsal[0], dorsal[2], 0.5),
             ("anal", Some(REAR), anal[0], anal[2], 0.5),
         ];

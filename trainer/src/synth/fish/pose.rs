@@ -18,7 +18,8 @@ struct Posture {
 }
 
 /// The bones of the spine from the head to the tail.
-const SPINE: [usize; 6] = [bone::HEAD, bone::FRONT, bone::REAR, bone::REAR + 1, bone::REAR + 2, bone::TAIL];
+const SPINE: [usize; 6] =
+    [bone::HEAD, bone::FRONT, bone::REAR, bone::REAR_MIDDLE, bone::REAR_END, bone::TAIL];
 /// How much each of them bends.
 const SHARES: [f64; 6] = [0.35, 0.6, 0.8, 1.0, 1.1, 0.9];
 

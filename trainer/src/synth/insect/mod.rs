@@ -24,24 +24,12 @@ pub(super) static PLAN: Plan = Plan {
     rest: |_, rng| pose::resting(rng),
 };
 
-/// Indices of the bones of an insect. Those of a limb are offsets to be passed to [`limb`].
+/// Indices of the bones of an insect. Those of a side are to be passed to [`bone::limb`].
 mod bone {
-    pub(super) const THORAX: usize = 0;
-    pub(super) const HEAD: usize = 1;
-    pub(super) const WAIST: usize = 2;
-    pub(super) const ABDOMEN: usize = 3;
-    /// The first of two bones of a feeler.
-    pub(super) const FEELER: usize = 4;
-    pub(super) const JAW: usize = 6;
-    /// The first of three bones of the front leg; those of the middle and of the hind leg follow.
-    pub(super) const LEG: usize = 7;
-    /// Bones of one side.
-    pub(super) const PER_SIDE: usize = 12;
-    pub(super) const COUNT: usize = FEELER + 2 * PER_SIDE;
-
-    /// Bone `name` of the left (`side` 0) or right (1) limb.
-    pub(super) fn limb(name: usize, side: usize) -> usize {
-        name + side * PER_SIDE
+    super::super::bones::bones! {
+        THORAX HEAD WAIST ABDOMEN;
+        FEELER FEELER_END JAW
+        LEG FRONT_SHIN FRONT_FOOT MIDDLE_THIGH MIDDLE_SHIN MIDDLE_FOOT HIND_THIGH HIND_SHIN HIND_FOOT;
     }
 }
 

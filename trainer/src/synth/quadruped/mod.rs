@@ -14,34 +14,12 @@ use super::recipe::Recipe;
 use super::species::Plan;
 use fmnet::mesh::vec3;
 
-/// Indices of the bones of a quadruped. Those of a limb are offsets to be passed to [`limb`].
+/// Indices of the bones of a quadruped. Those of a side are to be passed to [`bone::limb`].
 pub(in crate::synth) mod bone {
-    pub(in crate::synth) const PELVIS: usize = 0;
-    pub(in crate::synth) const LUMBAR: usize = 1;
-    pub(in crate::synth) const CHEST: usize = 2;
-    pub(in crate::synth) const LOW_NECK: usize = 3;
-    pub(in crate::synth) const NECK: usize = 4;
-    pub(in crate::synth) const HEAD: usize = 5;
-    /// The first of three bones of the tail.
-    pub(in crate::synth) const TAIL: usize = 6;
-    pub(in crate::synth) const BLADE: usize = 9;
-    pub(in crate::synth) const UPPER_ARM: usize = 10;
-    pub(in crate::synth) const FOREARM: usize = 11;
-    pub(in crate::synth) const HAND: usize = 12;
-    pub(in crate::synth) const FORE_TOES: usize = 13;
-    pub(in crate::synth) const THIGH: usize = 14;
-    pub(in crate::synth) const SHIN: usize = 15;
-    pub(in crate::synth) const FOOT: usize = 16;
-    pub(in crate::synth) const HIND_TOES: usize = 17;
-    /// Bones of one side.
-    pub(in crate::synth) const PER_SIDE: usize = 9;
-    /// The first of two bones of the proboscis.
-    pub(in crate::synth) const PROBOSCIS: usize = BLADE + 2 * PER_SIDE;
-    pub(in crate::synth) const COUNT: usize = PROBOSCIS + 2;
-
-    /// Bone `name` of the left (`side` 0) or right (1) limb.
-    pub(in crate::synth) fn limb(name: usize, side: usize) -> usize {
-        name + side * PER_SIDE
+    super::super::bones::bones! {
+        PELVIS LUMBAR CHEST LOW_NECK NECK HEAD TAIL TAIL_MIDDLE TAIL_END;
+        BLADE UPPER_ARM FOREARM HAND FORE_TOES THIGH SHIN FOOT HIND_TOES;
+        PROBOSCIS PROBOSCIS_END
     }
 }
 
@@ -165,14 +143,9 @@ impl Sculptor {
             let (head, tail) = (self.proboscis(from), self.proboscis(from + 0.5));
             self.recipe.skeleton.add(name, Some(parent), head, tail, 0.5);
         }
-        let kind = |index: usize| match index {
-            BLADE..PROBOSCIS => BLADE + (index - BLADE) % PER_SIDE,
-            PROBOSCIS.. => HEAD,
-            _ => index,
-        };
         self.recipe.magnified = (0..COUNT)
-            .map(|index| match kind(index) {
-                HEAD => HEAD_MAGNIFIED,
+            .map(|index| match left(index) {
+                HEAD | PROBOSCIS | PROBOSCIS_END => HEAD_MAGNIFIED,
                 FORE_TOES | HIND_TOES => PAW_MAGNIFIED,
                 _ => 1.0,
             })
