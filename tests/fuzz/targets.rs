@@ -287,7 +287,7 @@ fn shapes(folder: &Path) -> Target {
         write_mesh(&path, &mesh, &Attributes::default()).unwrap();
         std::fs::read(&path).unwrap()
     });
-    let options = ShapeOptions { decimate: Some(60), ..ShapeOptions::default() };
+    let options = ShapeOptions { decimate: Some(60), subdivide: Some(50), ..ShapeOptions::default() };
     let shot = ShotOptions { radius: 0.3, ..Default::default() };
     let target = Target::new(seeds.collect(), move |bytes| {
         let Ok(file) = decode_mesh(bytes, Path::new("a.off")) else { return false };

@@ -280,7 +280,8 @@ impl Shape {
             full_of_work = Some(input.slice()?);
         }
         let way_back = WayBack { input_of_full, full_of_input, full_of_work };
-        let fits = way_back.fits(&full_mesh, decimated.as_ref());
+        let n_input = as_read.as_ref().unwrap_or(&full_mesh).n_vertices();
+        let fits = way_back.fits(&full_mesh, decimated.as_ref()) && way_back.full_of_input.len() == n_input;
         let meshes = Meshes { full_mesh, decimated, input: as_read, warnings };
         fits.then(|| Self::assemble(name, options, key, meshes, way_back))
     }
