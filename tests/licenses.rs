@@ -68,9 +68,19 @@ fn expressions_are_understood() {
 
 #[test]
 fn every_dependency_may_be_used() {
+    check("");
+}
+
+/// The Python package has a lock file of its own.
+#[test]
+fn every_dependency_of_the_python_package_may_be_used() {
+    check("python");
+}
+
+fn check(folder: &str) {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--all-features", "--locked"])
-        .current_dir(root())
+        .current_dir(root().join(folder))
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -71,7 +71,8 @@ fn system_error(path: &Path, source: &std::io::Error) -> PyErr {
             let text = source.to_string().replace(&format!(" (os error {number})"), "");
             PyOSError::new_err((number, text, path.display().to_string()))
         }
-        None => PyOSError::new_err(format!("{}: {source}", path.display())),
+        // Its kind makes it the right subclass as well.
+        None => std::io::Error::new(source.kind(), format!("{}: {source}", path.display())).into(),
     }
 }
 

@@ -13,6 +13,9 @@ ray = pytest.importorskip("ray")
 sys.path.insert(0, str(ROOT / "examples" / "python"))
 pytestmark = pytest.mark.filterwarnings("default")
 
+# Ray's workers give way to everything else by default, and would wait for minutes on a busy machine.
+os.environ.setdefault("RAY_worker_niceness", "0")
+
 OPTIONS = dict(descriptor="shot", k=30)
 
 
