@@ -155,7 +155,8 @@ fn surfaces_that_lie_on_each_other_take_bounded_time() {
     });
     let crossed = Mesh::new(grid.vertices().to_vec(), other.collect()).unwrap();
     let thrice = Mesh::new(grid.vertices().to_vec(), [grid.faces(); 3].concat()).unwrap();
-    for (mesh, most) in [(&crossed, 1.01), (&thrice, 1.0 + 1e-9)] {
+    // Along sides and diagonals no way is longer than this, where the work is cut short.
+    for (mesh, most) in [(&crossed, 1.0824), (&thrice, 1.0 + 1e-9)] {
         for (v, distance) in exact(mesh, 0).into_iter().enumerate() {
             let straight = vec3::distance(mesh.vertices()[v], mesh.vertices()[0]);
             assert!(
