@@ -66,7 +66,8 @@ impl Shape {
         view(slf.as_any(), (mesh.n_faces(), 3), same_bytes(mesh.faces()))
     }
 
-    /// ndarray of int32, [n] : For each vertex of the working mesh, the vertex of the mesh that was given, -1 where it was inserted.
+    /// ndarray of int32, [n] : For each vertex of the working mesh, the vertex of the mesh that was given; the nearest one
+    /// where it was inserted.
     #[getter]
     fn input_vertices<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
         let shape = &self.inner.shape;
