@@ -43,7 +43,7 @@ def main():
     parser.add_argument("out", help="picture, .png or .pdf")
     arguments = parser.parse_args()
 
-    matcher = fmnet.Matcher(decimate="off")
+    matcher = fmnet.Matcher(decimate="off", subdivide="off")
     with tqdm(desc="stages", unit=" stages") as bar:
 
         def progress(subject, stage, seconds):

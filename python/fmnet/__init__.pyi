@@ -28,7 +28,7 @@ _Refinement = Literal["none", "icp", "zoomout", "wavelet", "pmf", "shared-triang
 _Upscaling = Literal["surface", "l21", "least-squares"]
 _Backend = Literal["native", "tract"]
 _Effort = Literal["low", "normal", "high"]
-_Decimate = Union[int, Literal["off"]]
+_Vertices = Union[int, Literal["off"]]
 _Side = Literal["source", "target"]
 
 class Error(ValueError): ...
@@ -141,7 +141,8 @@ class Matcher:
         upscale: _Upscaling = "surface",
         effort: _Effort = "normal",
         adapt: int | None = None,
-        decimate: _Decimate | None = None,
+        decimate: _Vertices | None = None,
+        subdivide: _Vertices | None = None,
         shot_radius: float | None = None,
         cache: _Path | None = None,
         backend: _Backend = "native",
@@ -162,6 +163,7 @@ class Matcher:
         target: Shape | _Mesh,
         *,
         partial: bool = False,
+        landmarks: ArrayLike | None = None,
         progress: _Progress | None = None,
     ) -> Match: ...
     def save(self, shape: Shape, path: _Path) -> None: ...
@@ -173,6 +175,7 @@ def match(
     target: Shape | _Mesh,
     *,
     partial: bool = False,
+    landmarks: ArrayLike | None = None,
     progress: _Progress | None = None,
     model: _Path | None = None,
     descriptor: _Descriptor = "learned",
@@ -183,7 +186,8 @@ def match(
     upscale: _Upscaling = "surface",
     effort: _Effort = "normal",
     adapt: int | None = None,
-    decimate: _Decimate | None = None,
+    decimate: _Vertices | None = None,
+    subdivide: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
     backend: _Backend = "native",
@@ -195,7 +199,7 @@ def features(
     model: _Path | None = None,
     descriptor: _Descriptor = "learned",
     k: int | None = None,
-    decimate: _Decimate | None = None,
+    decimate: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
     backend: _Backend = "native",

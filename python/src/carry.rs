@@ -1,8 +1,9 @@
 //! What belongs to one mesh, carried over a map to the other.
 
 use crate::arrays::{as_array, check_shape, integers, kind, matrix, out_matrix, reals};
-use crate::errors::{said, warn, wrong};
+use crate::errors::{Failure, said, warn, wrong};
 use crate::input::Input;
+use crate::result::Match;
 use crate::run::run;
 use crate::stages::in_map;
 use fmnet::Mesh;
@@ -37,14 +38,30 @@ fn way(
         Ok((source.load_mesh("source", observer)?, target.load_mesh("target", observer)?))
     })?;
     let map = in_map(targets, source.n_vertices(), target.n_vertices(), "targets")?;
-    run(py, None, move |_| Ok(Way::new(&map, source, target, to_source)))
+    let points = targets.cast::<Match>().ok().and_then(|found| found.get().inner.map.points.clone());
+    let n_faces = target.n_faces();
+    if points.iter().flatten().flatten().any(|point| point.face as usize >= n_faces) {
+        return Err(wrong(
+            "targets: a point of the map is on no triangle of the target; pass the meshes of the map",
+        ));
+    }
+    let map = PointMap { points, ..map };
+    run(py, None, move |_| Way::new(&map, source, target, to_source))
 }
 
 impl Way {
-    fn new(map: &PointMap, source: Mesh, target: Mesh, to_source: bool) -> Self {
-        let donors = if to_source { Donors::of_source(map) } else { Donors::of_target(map, &target) };
+    fn new(map: &PointMap, source: Mesh, target: Mesh, to_source: bool) -> Result<Self, Failure> {
+        let donors = match to_source {
+            true => Donors::of_source(map),
+            false => Donors::of_target(map, &target).map_err(said)?,
+        };
+        let is_finer = to_source && map.points.is_some();
         let (giver, receiver) = if to_source { (target, source) } else { (source, target) };
-        Self { donors: donors.interpolated(&receiver, &giver), giver, receiver }
+        let donors = match is_finer {
+            true => donors.on_surface(map, &giver),
+            false => donors.interpolated(&receiver, &giver),
+        };
+        Ok(Self { giver, receiver, donors })
     }
 }
 

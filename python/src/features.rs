@@ -7,7 +7,7 @@ use crate::options::Given;
 use crate::run::run;
 use fmnet::Matrix;
 use fmnet::network::contract::{ModelInput, Quantity};
-use fmnet::pipeline::{DescribedShape, Matcher};
+use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
 use fmnet::spectral::Eigenbasis;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -67,10 +67,13 @@ pub(crate) fn features<'py>(
         adapt: None,
         backend,
         decimate,
+        subdivide: None,
         shot_radius,
         cache,
     };
-    let (options, input) = (given.options()?, Input::mesh(mesh, "mesh")?);
+    // A row for each vertex of the mesh.
+    let options = MatchOptions { subdivide: Some(None), ..given.options()? };
+    let input = Input::mesh(mesh, "mesh")?;
     let found = run(py, progress, move |observer| {
         let matcher = Matcher::new(&options)?;
         let loaded = input.load("mesh", observer)?;

@@ -1,5 +1,6 @@
 //! `Matcher` and `match`.
 
+use crate::arrays::integers;
 use crate::errors::{Failure, io_error, said, wrong};
 use crate::input::{Input, Loaded};
 use crate::options::Given;
@@ -39,6 +40,9 @@ use std::sync::Arc;
 ///     Default: 10 where the first map is doubtful, else 0.
 /// decimate : int or "off", optional
 ///     Meshes of more vertices are decimated to so many, 100 and up. Default: the model's; 15000 with SHOT.
+/// subdivide : int or "off", optional
+///     Meshes of fewer vertices are subdivided inside to so many, 100 and up; results stay in the mesh's vertices. Default: 2000; off for
+///     the refinements pmf and shared-triangulation.
 /// shot_radius : float, optional
 ///     SHOT radius relative to sqrt(area), between 0 and 1. Default: the model's; 0.067 with SHOT.
 /// cache : path-like, optional
@@ -65,7 +69,7 @@ fn load(py: Python<'_>, options: MatchOptions) -> PyResult<Matcher> {
 impl Matcher {
     #[new]
     #[pyo3(signature = (model=None, *, descriptor="learned", k=None, fm=None, mask_weight=None, refine=None, upscale="surface",
-                        effort="normal", adapt=None, decimate=None, shot_radius=None, cache=None,
+                        effort="normal", adapt=None, decimate=None, subdivide=None, shot_radius=None, cache=None,
                         backend="native"))]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn new(
@@ -80,6 +84,7 @@ impl Matcher {
         effort: &str,
         adapt: Option<usize>,
         decimate: Option<Bound<'_, PyAny>>,
+        subdivide: Option<Bound<'_, PyAny>>,
         shot_radius: Option<f64>,
         cache: Option<PathBuf>,
         backend: &str,
@@ -95,6 +100,7 @@ impl Matcher {
             effort,
             adapt,
             decimate,
+            subdivide,
             shot_radius,
             cache,
             backend,
@@ -152,27 +158,31 @@ impl Matcher {
     ///     The shape whose vertices are matched, and the one that they are matched to.
     /// partial : bool
     ///     The source is a part of the target, in whatever pose and the same unit of length.
+    /// landmarks : ndarray of integers, [q, 2], optional
+    ///     Matches that are known, a source vertex and a target vertex each: kept exactly, they pull the rest of the map.
     /// progress : callable, optional
     ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
     ///
     /// Returns
     /// -------
     /// Match
-    #[pyo3(name = "match", signature = (source, target, *, partial=false, progress=None))]
+    #[pyo3(name = "match", signature = (source, target, *, partial=false, landmarks=None, progress=None))]
     fn match_(
         &self,
         py: Python<'_>,
         source: &Bound<'_, PyAny>,
         target: &Bound<'_, PyAny>,
         partial: bool,
+        landmarks: Option<&Bound<'_, PyAny>>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Match> {
         let (source, target) = (Input::new(source, "source")?, Input::new(target, "target")?);
+        let landmarks = landmarks.map_or(Ok(Vec::new()), in_landmarks)?;
         let matcher = self.inner.clone();
         let inner = run(py, progress, move |observer| {
             let (source, target) = (source.load("source", observer)?, target.load("target", observer)?);
             let [source, target] = pair(&matcher, source, target, partial, observer)?;
-            Ok(matcher.match_shapes(&source, &target, observer)?)
+            Ok(matcher.match_with_landmarks(&source, &target, &landmarks, observer)?)
         })?;
         Ok(Match { inner })
     }
@@ -248,9 +258,11 @@ impl Matcher {
 ///     Vertices [n, 3] of float32 or float64, faces [m, 3] of integers.
 /// partial : bool
 ///     The source is a part of the target, in whatever pose and the same unit of length.
+/// landmarks : ndarray of integers, [q, 2], optional
+///     Matches that are known, a source vertex and a target vertex each: kept exactly, they pull the rest of the map.
 /// progress : callable, optional
 ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
-/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, adapt, decimate, shot_radius, cache
+/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, adapt, decimate, subdivide, shot_radius, cache
 ///     As of :class:`Matcher`.
 ///
 /// Returns
@@ -262,8 +274,8 @@ impl Matcher {
 /// >>> match = fmnet.match("man.obj", "woman.glb")
 /// >>> match.targets  # for every vertex of man.obj the vertex of woman.glb
 #[pyfunction]
-#[pyo3(name = "match", signature = (source, target, *, partial=false, progress=None, model=None, descriptor="learned", k=None, fm=None,
-                    mask_weight=None, refine=None, upscale="surface", effort="normal", adapt=None, decimate=None, shot_radius=None, cache=None,
+#[pyo3(name = "match", signature = (source, target, *, partial=false, landmarks=None, progress=None, model=None, descriptor="learned", k=None, fm=None,
+                    mask_weight=None, refine=None, upscale="surface", effort="normal", adapt=None, decimate=None, subdivide=None, shot_radius=None, cache=None,
                         backend="native"))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn match_(
@@ -271,6 +283,7 @@ pub(crate) fn match_(
     source: &Bound<'_, PyAny>,
     target: &Bound<'_, PyAny>,
     partial: bool,
+    landmarks: Option<&Bound<'_, PyAny>>,
     progress: Option<&Bound<'_, PyAny>>,
     model: Option<PathBuf>,
     descriptor: &str,
@@ -282,6 +295,7 @@ pub(crate) fn match_(
     effort: &str,
     adapt: Option<usize>,
     decimate: Option<Bound<'_, PyAny>>,
+    subdivide: Option<Bound<'_, PyAny>>,
     shot_radius: Option<f64>,
     cache: Option<PathBuf>,
     backend: &str,
@@ -297,11 +311,12 @@ pub(crate) fn match_(
         effort,
         adapt,
         decimate,
+        subdivide,
         shot_radius,
         cache,
         backend,
     };
-    load(py, given.options()?)?.match_(py, source, target, partial, progress)
+    load(py, given.options()?)?.match_(py, source, target, partial, landmarks, progress)
 }
 
 /// A loaded input, described; with the area of the whole, as a part.
@@ -337,13 +352,18 @@ fn pair(
             "{name} was described as a whole shape; describe it with whole_area=, the area of the target, to match it as a part"
         )));
     }
-    let area = match &target {
-        Loaded::Mesh(_, mesh) => mesh.area(),
-        Loaded::Shape(shape) => shape.shape.full_mesh.area(),
-    };
-    let (source, target) = rayon::join(
-        || described(matcher, source, partial.then_some(area), observer),
-        || described(matcher, target, None, observer),
-    );
-    Ok([source?, target?])
+    if let (Loaded::Mesh(source_name, source), Loaded::Mesh(target_name, target)) = (&source, &target) {
+        let pair = matcher.describe_pair((source_name, source), (target_name, target), partial, observer)?;
+        return Ok(pair.map(Arc::new));
+    }
+    let target = described(matcher, target, None, observer)?;
+    let whole_area = partial.then(|| target.shape.full_mesh.area());
+    Ok([described(matcher, source, whole_area, observer)?, target])
+}
+
+/// Pairs of vertices.
+fn in_landmarks(object: &Bound<'_, PyAny>) -> PyResult<Vec<(u32, u32)>> {
+    let (vertices, _) = integers(object, &[None, Some(2)], "landmarks")?;
+    let vertex = |v: i64| u32::try_from(v).map_err(|_| wrong(format!("landmarks: there is no vertex {v}")));
+    vertices.chunks_exact(2).map(|pair| Ok((vertex(pair[0])?, vertex(pair[1])?))).collect()
 }

@@ -21,6 +21,7 @@ pub(crate) struct Given<'a, 'py> {
     pub(crate) adapt: Option<usize>,
     pub(crate) backend: &'a str,
     pub(crate) decimate: Option<Bound<'py, PyAny>>,
+    pub(crate) subdivide: Option<Bound<'py, PyAny>>,
     pub(crate) shot_radius: Option<f64>,
     pub(crate) cache: Option<PathBuf>,
 }
@@ -48,7 +49,8 @@ impl Given<'_, '_> {
             effort: named("effort", self.effort)?,
             adapt: self.adapt,
             backend: named("backend", self.backend)?,
-            decimate: self.decimate.as_ref().map(decimation).transpose()?,
+            decimate: self.decimate.as_ref().map(|n| vertices("decimate", n)).transpose()?,
+            subdivide: self.subdivide.as_ref().map(|n| vertices("subdivide", n)).transpose()?,
             shot_radius: self.shot_radius,
             cache: self.cache,
             ..MatchOptions::default()
@@ -71,13 +73,14 @@ pub(crate) fn weight(mask_weight: Option<f64>) -> PyResult<Option<f64>> {
     }
 }
 
-fn decimation(value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+/// A number of vertices, or never.
+fn vertices(option: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     let is_off = value.extract::<String>().is_ok_and(|text| text == "off");
     match value.extract::<usize>() {
         _ if is_off => Ok(None),
         Ok(n) if n >= 100 => Ok(Some(n)),
         _ => {
-            Err(wrong(format!("decimate is {value}, expected a number of vertices, 100 or more, or \"off\"")))
+            Err(wrong(format!("{option} is {value}, expected a number of vertices, 100 or more, or \"off\"")))
         }
     }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// A shape that was processed and described by :meth:`Matcher.describe`, ready to be matched many times.
 ///
 /// It can be pickled, and written to a file by :meth:`Matcher.save`. Arrays are read-only; ``n`` counts the vertices of the
-/// working mesh, which is repaired and, where it was large, decimated.
+/// working mesh, which is repaired and, where it was large, decimated, or where it was small, subdivided.
 #[pyclass(frozen, module = "fmnet")]
 pub(crate) struct Shape {
     pub(crate) inner: Arc<DescribedShape>,
@@ -66,7 +66,8 @@ impl Shape {
         view(slf.as_any(), (mesh.n_faces(), 3), same_bytes(mesh.faces()))
     }
 
-    /// ndarray of int32, [n] : For each vertex of the working mesh, the vertex of the mesh that was given.
+    /// ndarray of int32, [n] : For each vertex of the working mesh, the vertex of the mesh that was given; the nearest one
+    /// where it was inserted.
     #[getter]
     fn input_vertices<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
         let shape = &self.inner.shape;

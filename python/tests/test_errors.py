@@ -6,7 +6,7 @@ import fmnet
 import numpy as np
 import pytest
 
-SHOT = dict(descriptor="shot", k=10)
+SHOT = dict(descriptor="shot", k=10, subdivide="off")
 
 
 def changed(array, at, value):
@@ -46,6 +46,7 @@ def test_bad_meshes(mesh, form, text):
         (dict(mask_weight=-1.0), "mask_weight is -1, expected 0 or more"),
         (dict(decimate=3), "decimate is 3, expected a number of vertices"),
         (dict(decimate="no"), "decimate is no"),
+        (dict(subdivide=10), "subdivide is 10, expected a number of vertices"),
         (dict(shot_radius=2.0), "shot_radius is 2"),
         (dict(adapt=101), "adapt is 101, expected 0 to 100"),
         (dict(backend="gpu"), "backend: unknown variant `gpu`"),

@@ -11,7 +11,7 @@ import pytest
 
 from conftest import sphere
 
-SHOT = dict(descriptor="shot", k=40, shot_radius=0.2)
+SHOT = dict(descriptor="shot", k=40, shot_radius=0.2, subdivide="off")
 
 
 def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
@@ -34,6 +34,7 @@ def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
         dict(fm="bidirectional", mask_weight=0.1, refine="none"),
         dict(decimate=1000, upscale="least-squares", effort="low"),
         dict(decimate=1000),
+        dict(subdivide=3000),
         dict(adapt=2, backend="native"),
         dict(backend="tract"),
         dict(decimate="off", refine="icp"),
@@ -164,6 +165,26 @@ def test_quality_and_points_on_the_surface(demo, program, mesh, tmp_path):
         warnings.simplefilter("ignore")
         mirrored = fmnet.match(mesh, flipped, descriptor="shot", k=10, shot_radius=0.2)
     assert mirrored.quality.reversed > match.quality.reversed
+
+
+def test_landmarks_are_kept_as_by_the_program(demo, program, tmp_path):
+    (tmp_path / "landmarks.txt").write_text("3 3\n700 700\n")
+    program("match", *demo, "--landmarks", tmp_path / "landmarks.txt", "-o", tmp_path / "p.csv")
+    match = fmnet.match(*demo, landmarks=[[3, 3], [700, 700]])
+    match.save(tmp_path / "m.csv")
+    assert (tmp_path / "m.csv").read_bytes() == (tmp_path / "p.csv").read_bytes()
+    assert list(match.targets[[3, 700]]) == [3, 700]
+    for wrong, text in [([[3, -1]], "landmarks: there is no vertex -1"), ([3, 7], "landmarks: the shape is"), ([[3, 2400]], "2400")]:
+        with pytest.raises(fmnet.Error, match=text):
+            fmnet.match(*demo, landmarks=wrong)
+
+
+def test_small_meshes_are_subdivided_inside(mesh):
+    options = dict(descriptor="shot", k=40, shot_radius=0.2)
+    shape = fmnet.Matcher(**options).describe(mesh)
+    assert shape.n_input == 642 and len(shape.vertices) >= 2000
+    np.testing.assert_array_equal(shape.input_vertices[:642], np.arange(642))
+    assert len(fmnet.match(mesh, mesh, **options).targets) == 642
 
 
 def test_the_cache_is_used(mesh, tmp_path):

@@ -15,7 +15,7 @@ import pytest
 
 from conftest import sphere
 
-SHOT = dict(descriptor="shot", k=40, shot_radius=0.2)
+SHOT = dict(descriptor="shot", k=40, shot_radius=0.2, subdivide="off")
 
 
 def test_progress_tells_where_stages_begin_and_end(mesh):
