@@ -111,7 +111,8 @@ fn its_descriptors_come_out_of_the_mesh_through_the_exported_file() {
     (metadata.k, metadata.solver) = (100, fmnet::fmap::FmapSolver::Joint { weight: 0.1 });
     export(&trained(&folder), &metadata, &model).unwrap();
     DescriptorNetwork::load(&model, Backend::Tract).unwrap();
-    let options = MatchOptions { model: ModelSource::File(model), ..MatchOptions::default() };
+    let options =
+        MatchOptions { model: ModelSource::File(model), subdivide: Some(None), ..MatchOptions::default() };
     let matcher = Matcher::new(&options).unwrap();
     let mesh = read_mesh(&folder.join("tr_reg_060_1500.off")).unwrap().mesh;
     let described = matcher.describe("reference", &mesh, &fmnet::events::ignore).unwrap();

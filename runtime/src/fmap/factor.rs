@@ -64,13 +64,17 @@ impl Factor {
         }
     }
 
-    /// Replaces every column of `right`, `[k, m]`, by its solution.
+    /// Replaces every column of `right`, `[k, m]`, by its solution. The work is done on a copy of its own: what faer rounds depends
+    /// on where in memory a column begins, and a [`Mat`] always begins at the same alignment.
     pub(super) fn solve(&self, mut right: MatMut<'_, f64>) {
         match self {
             Self::Cholesky(lower) => {
                 let scratch = solve::solve_in_place_scratch::<f64>(lower.nrows(), right.ncols(), Par::Seq);
                 let mut memory = MemBuffer::new(scratch);
-                solve::solve_in_place(lower.as_ref(), right, Par::Seq, MemStack::new(&mut memory));
+                let mut aligned = right.to_owned();
+                let stack = MemStack::new(&mut memory);
+                solve::solve_in_place(lower.as_ref(), aligned.as_mut(), Par::Seq, stack);
+                right.copy_from(aligned);
             }
             Self::Truncated(svd, rank) => right.copy_from(truncated_solution(svd, *rank, right.as_ref())),
         }

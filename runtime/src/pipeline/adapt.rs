@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn adam_walks_downhill() {
         let mut adam = Adam::new(vec![3.0, -2.0]);
-        for _ in 0..3000 {
+        for _ in 0..5000 {
             let gradient: Vec<f32> = adam.parameters.iter().map(|x| 2.0 * x).collect();
             adam.step(&gradient);
         }

@@ -32,7 +32,7 @@ use crate::refine::PmfInfo;
 use crate::shape::{Context, Shape, ShapeOptions};
 use crate::upscale::AdmmInfo;
 use crate::{Matrix, Mesh};
-use pair::Pair;
+use pair::{Pair, QUALITY_K};
 use std::path::Path;
 
 pub use candidates::Candidate;
@@ -268,8 +268,9 @@ impl Matcher {
                 shape.n()
             )));
         }
-        // Asked for once at its largest, the eigenbasis serves every smaller one.
-        shape.eigenbasis(self.refined_k(&shape).max(described_k.min(shape.max_eigenpairs())), context)?;
+        // Asked for once at its largest, the eigenbasis serves every smaller one, the same for every pair.
+        let wanted = self.refined_k(&shape).max(described_k.max(QUALITY_K).min(shape.max_eigenpairs()));
+        shape.eigenbasis(wanted, context)?;
         let descriptors = self.descriptor().describe(&shape, context)?;
         Ok(DescribedShape { shape, descriptors, described_by: self.descriptor_key() })
     }

@@ -19,7 +19,7 @@ use crate::spectral::{Eigenbasis, Laplacian};
 use std::sync::Arc;
 
 /// Eigenfunctions that quality is measured with, at least, where a shape has them.
-const QUALITY_K: usize = 30;
+pub(super) const QUALITY_K: usize = 30;
 
 pub(super) struct Pair<'a> {
     pub(super) matcher: &'a Matcher,
