@@ -271,7 +271,7 @@ fn bad_usage_and_bad_input_exit_with_2_and_name_the_culprit() {
         (shot(&["match", "a.off", "a.off", "-o", "absent/m.txt"]), "absent"),
         (shot(&["match", "a.off", "broken.off", "-o", "m.txt"]), "broken.off"),
         (shot(&["match", "a.off", "absent.ply", "-o", "m.txt"]), "absent.ply"),
-        (shot(&["match", "a.off", "a.off", "-o", "m.txt", "-k", "500"]), "k"),
+        (shot(&["match", "a.off", "a.off", "-o", "m.txt", "-k", "500", "--subdivide", "off"]), "k"),
         (vec!["match", "a.off", "a.off", "-o", "m.txt", "--model", "text.onnx"], "text.onnx"),
         (vec!["inspect", "text.onnx"], "text.onnx"),
     ] {
