@@ -43,7 +43,7 @@ fn every_place_of_a_path_takes_any_name_or_is_refused_by_name() {
             [
                 os(&["evaluate"]),
                 vec![folder.clone()],
-                os(&["--shot", "--json", "--pairs", "1", "--out"]),
+                os(&["--shot", "--json", "--pairs", "1", "--splits", "train,validation", "--out"]),
                 vec![folder],
             ]
             .concat(),
