@@ -6,7 +6,7 @@ use std::os::unix::ffi::OsStringExt;
 use std::path::Path;
 use std::process::{Output, Stdio};
 
-const SYNTH: [&str; 7] = ["synth", "--species", "man", "--count", "2", "--min-vertices", "600"];
+const SYNTH: [&str; 5] = ["synth", "--species", "man", "--count", "2"];
 
 fn run(work: &Workplace, arguments: &[&OsStr]) -> Output {
     train().current_dir(work.folder()).args(arguments).output().unwrap()
@@ -20,8 +20,7 @@ fn every_place_of_a_path_takes_any_name_or_is_refused_by_name() {
         return skipped("this disk takes no names but Unicode");
     }
     let os = |words: &[&str]| -> Vec<OsString> { words.iter().map(OsString::from).collect() };
-    let sized = ["--max-vertices", "700", "--json"];
-    let synth = [os(&SYNTH), os(&sized), vec![folder.clone()]].concat();
+    let synth = [os(&SYNTH), os(&["--json"]), vec![folder.clone()]].concat();
     let commands = [
         (synth, 0),
         (
@@ -44,7 +43,7 @@ fn every_place_of_a_path_takes_any_name_or_is_refused_by_name() {
             [
                 os(&["evaluate"]),
                 vec![folder.clone()],
-                os(&["--shot", "--json", "--pairs", "1", "--out"]),
+                os(&["--shot", "--json", "--pairs", "1", "--splits", "train,validation", "--out"]),
                 vec![folder],
             ]
             .concat(),
@@ -66,7 +65,7 @@ fn a_closed_pipe_is_no_fault_and_a_full_device_is_named() {
     let work = Workplace::new();
     let synth = |folder: &str, out: Stdio| {
         let mut command = train();
-        command.current_dir(work.folder()).args(SYNTH).args(["--max-vertices", "700", "--json", folder]);
+        command.current_dir(work.folder()).args(SYNTH).args(["--json", folder]);
         command.stdout(out).stderr(Stdio::piped()).spawn().unwrap()
     };
     let mut child = synth("a", Stdio::piped());

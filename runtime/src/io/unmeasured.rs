@@ -26,7 +26,7 @@ impl Unmeasured {
     /// Puts them where no other vertex is; returns what is to be said about it.
     ///
     /// # Errors
-    /// If a face has such a vertex, or no vertex has a position: then what is wrong with the first one.
+    /// If a face has such a vertex, or there is no face or no position at all: then what is wrong with the first one.
     pub(super) fn settle(mut self, vertices: &mut [[f64; 3]], faces: &[[u32; 3]]) -> Parsed<Option<String>> {
         let Some(&first) = self.vertices.first() else { return Ok(None) };
         let mut is_unmeasured = vec![false; vertices.len()];
@@ -35,7 +35,8 @@ impl Unmeasured {
         // Faces of vertices that do not exist are refused later.
         let exists = |v: &&u32| (**v as usize) < vertices.len();
         faces.iter().flatten().filter(exists).for_each(|&v| is_used[v as usize] = true);
-        let needed = self.vertices.iter().position(|&v| is_used[v as usize]);
+        // Of points alone none can be told from the others.
+        let needed = self.vertices.iter().position(|&v| faces.is_empty() || is_used[v as usize]);
         let free = free_place(vertices, &is_unmeasured);
         let (Some(free), None) = (free, needed) else {
             let at = needed.unwrap_or(0);
@@ -117,6 +118,8 @@ mod tests {
 
     #[test]
     fn a_file_of_nothing_else_is_refused_with_the_first() {
+        let points = decode_mesh(b"v nan 0 0\nv 1 0 0\n", Path::new("a.obj")).unwrap_err().to_string();
+        assert!(points.contains("line 1: a coordinate is not finite"), "{points}");
         let mut text = String::from("OFF\n3000 0 0\n");
         (0..3000).for_each(|_| text.push_str("nan nan nan\n"));
         let error = decode_mesh(text.as_bytes(), Path::new("a.off")).unwrap_err().to_string();
