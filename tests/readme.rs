@@ -208,7 +208,9 @@ fn every_option_that_a_page_names_exists() {
     for command in ["demo", "match", "batch", "transfer", "features", "evaluate", "inspect"] {
         known.extend(help(infer(), &[command, "--help"]));
     }
-    for command in ["synth", "preprocess", "train", "calibrate", "export", "evaluate", "reproduce", "simulate"] {
+    for command in
+        ["synth", "preprocess", "train", "calibrate", "export", "evaluate", "reproduce", "simulate"]
+    {
         known.extend(help(train(), &[command, "--help"]));
     }
     for kind in ["parts", "scans", "triangulations"] {
