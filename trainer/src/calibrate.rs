@@ -125,10 +125,9 @@ fn accumulate(gram: &mut [Weights; WIDTH], right: &mut Weights, x: &Weights, wei
 fn solve(mut matrix: [Weights; WIDTH], mut right: Weights) -> Weights {
     for i in 0..WIDTH {
         for j in i + 1..WIDTH {
-            let factor = matrix[j][i] / matrix[i][i];
-            for k in i..WIDTH {
-                matrix[j][k] -= factor * matrix[i][k];
-            }
+            let pivot = matrix[i];
+            let factor = matrix[j][i] / pivot[i];
+            matrix[j].iter_mut().zip(pivot).for_each(|(entry, above)| *entry -= factor * above);
             right[j] -= factor * right[i];
         }
     }
