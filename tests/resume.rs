@@ -75,9 +75,13 @@ fn a_stopped_run_goes_on_exactly() {
         steps: 1,
         ..stopped.clone()
     };
-    let fresh = TrainConfig { initial: Default::default(), out: folder.path().join("fresh"), ..started.clone() };
+    let fresh =
+        TrainConfig { initial: Default::default(), out: folder.path().join("fresh"), ..started.clone() };
     let (started_loss, fresh_loss) = (losses(&started, u64::MAX)[0].1, losses(&fresh, u64::MAX)[0].1);
-    assert!(started_loss < 0.95 * fresh_loss, "from trained weights {started_loss}, from random ones {fresh_loss}");
+    assert!(
+        started_loss < 0.95 * fresh_loss,
+        "from trained weights {started_loss}, from random ones {fresh_loss}"
+    );
     let blocks = NetworkOptions::Residual(ResidualOptions { blocks: 1, ..ResidualOptions::default() });
     let wrong = TrainConfig { network: blocks, out: folder.path().join("wrong"), ..started };
     let error = train(&wrong, &Device::Cpu, &|_| {}, &AtomicBool::new(false)).unwrap_err();

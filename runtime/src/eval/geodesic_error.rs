@@ -60,7 +60,12 @@ pub fn surface_errors(
     let beyond = |point: &&SurfacePoint| point.face as usize >= mesh.n_faces();
     if let Some(point) = map.points.iter().flatten().flatten().find(beyond) {
         let (index, n_vertices) = (point.face, mesh.n_faces());
-        return Err(EvalError::IndexOutOfRange { what: "a point of the map", side: "face of the target", index, n_vertices });
+        return Err(EvalError::IndexOutOfRange {
+            what: "a point of the map",
+            side: "face of the target",
+            index,
+            n_vertices,
+        });
     }
     let vertices = vertices_on_surface(mesh);
     let found = |x: u32| match &map.points {

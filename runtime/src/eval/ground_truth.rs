@@ -232,7 +232,10 @@ mod tests {
     fn identity_needs_one_size() {
         assert_eq!(GroundTruthSource::Identity.load_vertices(3, 3).unwrap(), GroundTruth::identity(3));
         assert!(matches!(GroundTruthSource::Identity.load_vertices(3, 4), Err(EvalError::NoIdentity { .. })));
-        assert_eq!(GroundTruthSource::FirstVertices(2).load_vertices(3, 4).unwrap().pairs(), &[(0, 0), (1, 1)]);
+        assert_eq!(
+            GroundTruthSource::FirstVertices(2).load_vertices(3, 4).unwrap().pairs(),
+            &[(0, 0), (1, 1)]
+        );
         assert!(matches!(
             GroundTruthSource::FirstVertices(4).load_vertices(3, 4),
             Err(EvalError::IndexOutOfRange { side: "source", index: 3, .. })
@@ -257,6 +260,9 @@ mod tests {
         ));
         let map = GroundTruthSource::Map(file("map.txt", "1\n-1\n0\n"));
         assert_eq!(map.load_vertices(3, 2).unwrap().pairs(), &[(0, 1), (2, 0)]);
-        assert!(matches!(map.load_vertices(4, 2), Err(EvalError::SizeMismatch { found: 3, expected: 4, .. })));
+        assert!(matches!(
+            map.load_vertices(4, 2),
+            Err(EvalError::SizeMismatch { found: 3, expected: 4, .. })
+        ));
     }
 }

@@ -27,7 +27,9 @@ fn decode(bytes: &[u8]) -> Parsed<Vec<(u32, u32)>> {
             false => vertex(&mut words, "the target vertex")?,
         };
         if let Some(word) = words.next() {
-            return Err(words.error(format!("{} follows; a source and a target vertex are expected", quote(word))));
+            return Err(
+                words.error(format!("{} follows; a source and a target vertex are expected", quote(word)))
+            );
         }
         landmarks.push((source, target));
     }

@@ -211,7 +211,8 @@ pub(super) fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<(), I
         }
         Ok(archive.finish()?.into_inner())
     };
-    let bytes = written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })?;
+    let bytes =
+        written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })?;
     write_atomically(path, |w| w.write_all(&bytes))
 }
 

@@ -99,7 +99,8 @@ pub fn write_point_map(path: &Path, map: &PointMap) -> Result<(), IoError> {
 /// `targets` int32 `[n]`, `confidence` float32 `[n]`, `faces` int32 `[n]`, `weights` float64 `[n, 3]`: what the map has of them.
 fn write_npz(path: &Path, map: &PointMap) -> Result<(), IoError> {
     let index = |value: Option<u32>| value.map_or(Some(-1), |value| i32::try_from(value).ok());
-    let faces = |points: &Vec<Option<SurfacePoint>>| points.iter().map(|p| index(p.map(|p| p.face))).collect();
+    let faces =
+        |points: &Vec<Option<SurfacePoint>>| points.iter().map(|p| index(p.map(|p| p.face))).collect();
     let targets: Option<Vec<i32>> = map.iter().map(index).collect();
     let faces: Option<Option<Vec<i32>>> = map.points.as_ref().map(faces);
     let (Some(targets), Some(faces)) = (targets, faces.map_or(Some(None), |faces| faces.map(Some))) else {

@@ -153,10 +153,13 @@ impl DescriptorNetwork {
             (Backend::Native, None) => Backend::Tract,
             (chosen, _) => chosen,
         };
-        let engine = load_engine(bytes, &contract, native.as_ref(), backend).map_err(|failure| match failure {
-            Failure::Absent => NetworkError::BackendAbsent { backend },
-            Failure::Refused(reason) => NetworkError::Backend { path: path.to_path_buf(), backend, reason },
-        })?;
+        let engine =
+            load_engine(bytes, &contract, native.as_ref(), backend).map_err(|failure| match failure {
+                Failure::Absent => NetworkError::BackendAbsent { backend },
+                Failure::Refused(reason) => {
+                    NetworkError::Backend { path: path.to_path_buf(), backend, reason }
+                }
+            })?;
         let fingerprint = *blake3::hash(bytes).as_bytes();
         Ok(Self { path: path.to_path_buf(), contract, fingerprint, backend, engine, native })
     }
@@ -238,7 +241,9 @@ fn load_engine(
     backend: Backend,
 ) -> Result<Box<dyn Engine>, Failure> {
     match backend {
-        Backend::Native => native.map(|native| Box::new(native.clone()) as Box<dyn Engine>).ok_or(Failure::Absent),
+        Backend::Native => {
+            native.map(|native| Box::new(native.clone()) as Box<dyn Engine>).ok_or(Failure::Absent)
+        }
         #[cfg(feature = "tract")]
         Backend::Tract => Ok(Box::new(tract::TractEngine::load(bytes, contract).map_err(Failure::Refused)?)),
         #[cfg(feature = "ort")]

@@ -65,7 +65,8 @@ impl NativeNetwork {
         let wks_pairs = constants.integer("wks.eigenvectors.end").unwrap_or(pairs).min(pairs);
         let width = constants.floats("input.bias")?.len();
         let outputs = constants.floats("output.bias")?.len();
-        let blocks = (0..).take_while(|block| constants.0.contains_key(&*format!("blocks.{block}.time"))).count();
+        let blocks =
+            (0..).take_while(|block| constants.0.contains_key(&*format!("blocks.{block}.time"))).count();
         let architecture = Architecture { inputs: wks_energies + shot_width, blocks, width, outputs };
         let mut parameters = Vec::with_capacity(architecture.n_parameters());
         for parameter in architecture.parameters() {

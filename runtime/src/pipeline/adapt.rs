@@ -41,7 +41,10 @@ pub(super) fn adapted(pair: &Pair, network: &NativeNetwork, steps: usize) -> Res
     let sides = [Fixed::new(pair, 0)?, Fixed::new(pair, 1)?];
     let mut adam = Adam::new(network.parameters().to_vec());
     for _ in 0..steps {
-        let runs = [run(pair, network, &adam.parameters, &inputs[0])?, run(pair, network, &adam.parameters, &inputs[1])?];
+        let runs = [
+            run(pair, network, &adam.parameters, &inputs[0])?,
+            run(pair, network, &adam.parameters, &inputs[1])?,
+        ];
         let gradients = gradients(&sides, [&runs[0].0, &runs[1].0])?;
         let mut total = vec![0.0f32; adam.parameters.len()];
         for ((input, (_, activations)), gradient) in inputs.iter().zip(&runs).zip(&gradients) {

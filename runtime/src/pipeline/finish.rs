@@ -50,7 +50,8 @@ pub(super) fn on_inputs(
     let confidence_of = |full: usize| -> f32 {
         let Some(place) = places[full] else { return 0.0 };
         let corners = source.mesh().faces()[place.face as usize];
-        let doubt: f64 = corners.iter().zip(place.weights).map(|(&v, w)| w * f64::from(doubt[v as usize])).sum();
+        let doubt: f64 =
+            corners.iter().zip(place.weights).map(|(&v, w)| w * f64::from(doubt[v as usize])).sum();
         (1.0 - doubt).clamp(0.0, 1.0) as f32
     };
     let n_full = places.len();
@@ -89,12 +90,8 @@ fn in_input_vertices(
     confidence: &[f32],
     points: Option<&[Option<SurfacePoint>]>,
 ) -> PointMap {
-    let full: Vec<Option<usize>> = source
-        .way_back
-        .full_of_input
-        .iter()
-        .map(|&v| (v != WayBack::NONE).then_some(v as usize))
-        .collect();
+    let full: Vec<Option<usize>> =
+        source.way_back.full_of_input.iter().map(|&v| (v != WayBack::NONE).then_some(v as usize)).collect();
     PointMap {
         targets: full.iter().map(|v| v.map_or(PointMap::UNMATCHED, |v| targets[v])).collect(),
         confidence: Some(full.iter().map(|v| v.map_or(0.0, |v| confidence[v])).collect()),

@@ -73,7 +73,9 @@ impl Landmarks {
     /// The coefficients of both shapes with those of the landmarks beside them, `[k, q + q']`.
     pub(super) fn beside_coefficients(&self, hats: [Matrix; 2], bases: &[Eigenbasis; 2]) -> [Matrix; 2] {
         let own: [Matrix; 2] = std::array::from_fn(|i| bases[i].project(&self.warmth[i].map(|x| x as f32)));
-        let factor = (IN_SYSTEM * (squares(&hats[0]) + squares(&hats[1])) / (squares(&own[0]) + squares(&own[1]))).sqrt();
+        let factor = (IN_SYSTEM * (squares(&hats[0]) + squares(&hats[1]))
+            / (squares(&own[0]) + squares(&own[1])))
+        .sqrt();
         std::array::from_fn(|i| beside(&hats[i], &own[i], factor))
     }
 

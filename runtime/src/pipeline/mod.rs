@@ -372,7 +372,10 @@ mod tests {
         let error = |landmarks: &[(u32, u32)]| {
             let found = matcher.match_with_landmarks(&source, &target, landmarks, &ignore).unwrap();
             for &(x, y) in landmarks {
-                assert_eq!((found.map.get(x as usize), found.map.confidence.as_ref().unwrap()[x as usize]), (Some(y), 1.0));
+                assert_eq!(
+                    (found.map.get(x as usize), found.map.confidence.as_ref().unwrap()[x as usize]),
+                    (Some(y), 1.0)
+                );
             }
             let vertices = target.shape.input_mesh().vertices();
             let miss = |(x, y): (usize, Option<u32>)| {
@@ -416,6 +419,8 @@ mod tests {
         }
         let mean = sum / source.n_vertices() as f64 / target.scale();
         assert!(mean < 0.01 && worst < 0.1 * target.scale(), "mean {mean}, worst {worst}");
-        assert!(found.estimate.expected_error < 5.0 && !found.estimate.doubtful && found.candidates.len() == 1);
+        assert!(
+            found.estimate.expected_error < 5.0 && !found.estimate.doubtful && found.candidates.len() == 1
+        );
     }
 }

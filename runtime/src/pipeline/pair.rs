@@ -1,8 +1,8 @@
 //! A pair on its way through the stages: functional maps, point map, refinement, judgement, the inputs' vertices.
 
 use super::candidates::{Start, Tried};
-use super::landmarks::Landmarks;
 use super::finish::{full_by_functional_map, on_inputs};
+use super::landmarks::Landmarks;
 use super::{DescribedShape, Match, Matcher, Refinement, Upscaling};
 use crate::Matrix;
 use crate::error::Error;

@@ -81,7 +81,8 @@ impl Embedding {
     /// # Panics
     /// If they have not as many rows.
     pub fn with_columns(&self, source: &Matrix, target: &Matrix) -> Self {
-        let factors = self.factors.as_ref().map(|[left, right]| [beside(left, source), beside(right, target)]);
+        let factors =
+            self.factors.as_ref().map(|[left, right]| [beside(left, source), beside(right, target)]);
         Self { source: beside(&self.source, source), target: beside(&self.target, target), factors }
     }
 
@@ -158,7 +159,8 @@ mod tests {
         let source = rectangle(30, 40, 25);
         let order = shuffle(1200);
         let target = reordered(&source, &order);
-        let embedding = BothMaps::with_adjoint(identity(25)).embedding(Comparison::Joint, &source, &target).unwrap();
+        let embedding =
+            BothMaps::with_adjoint(identity(25)).embedding(Comparison::Joint, &source, &target).unwrap();
         let (forth, back) = (embedding.forth().unwrap(), embedding.back().unwrap());
         assert_eq!(back.targets, order);
         assert_eq!(embedding.matches().unwrap(), [forth.targets.clone(), order.clone()]);

@@ -1,7 +1,7 @@
 //! How doubtful a map is at each vertex.
 
-use super::surface::{TORN, cycle_at, keeps_orientation, stretch};
 use super::Side;
+use super::surface::{TORN, cycle_at, keeps_orientation, stretch};
 use crate::point_map::PointMap;
 use rayon::prelude::*;
 

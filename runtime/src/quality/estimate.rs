@@ -70,7 +70,9 @@ impl Calibration {
         let mut weights = calibration.error.iter().chain(&calibration.bad);
         match weights.all(|w| w.is_finite()) && (0.0..=1.0).contains(&calibration.doubtful) {
             true => Ok(calibration),
-            false => Err("has a weight that is not finite, or a threshold that is no probability".to_string()),
+            false => {
+                Err("has a weight that is not finite, or a threshold that is no probability".to_string())
+            }
         }
     }
 

@@ -58,7 +58,8 @@ pub(super) fn measure(map: &PointMap, source: Side, target: Side) -> Surface {
     }
     let mut matched = vec![false; map.n_target];
     map.iter().flatten().for_each(|y| matched[y as usize] = true);
-    let covered: f64 = target.basis.mass.iter().zip(&matched).map(|(area, &is)| if is { *area } else { 0.0 }).sum();
+    let covered: f64 =
+        target.basis.mass.iter().zip(&matched).map(|(area, &is)| if is { *area } else { 0.0 }).sum();
     Surface {
         dirichlet: dirichlet(map, source, target),
         stretched: torn as f64 / stretches.len().max(1) as f64,

@@ -9,12 +9,12 @@ pub mod report;
 mod shapes;
 
 use crate::dataset::{Dataset, DatasetError};
-use fmnet::quality::Quality;
 use fmnet::eval::{ErrorCurve, ErrorSummary, EvalError, geodesic_errors, symmetric_geodesic_errors};
 use fmnet::events::{Event, Observer};
 use fmnet::io::{IoError, read_point_map};
 use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
 use fmnet::point_map::PointMap;
+use fmnet::quality::Quality;
 use shapes::LoadedShape;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

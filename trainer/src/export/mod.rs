@@ -9,10 +9,10 @@ pub(crate) use graph::{axis, float, integer, integers};
 
 use crate::checkpoint::Checkpoint;
 use crate::network::{Network, NetworkOptions, Normalization, parameter_values};
-use fmnet::quality::Calibration;
 use fmnet::diffusion_net::Parameter;
 use fmnet::io::{IoError, write_atomically};
 use fmnet::network::contract::{FORMAT_VERSION, ModelMetadata};
+use fmnet::quality::Calibration;
 use prost::Message;
 use std::path::Path;
 use thiserror::Error;
@@ -43,7 +43,12 @@ pub struct ModelOrigin {
 
 impl Default for ModelOrigin {
     fn default() -> Self {
-        Self { training_set: None, license: "unspecified".into(), commit: env!("CARGO_PKG_VERSION").into(), calibration: None }
+        Self {
+            training_set: None,
+            license: "unspecified".into(),
+            commit: env!("CARGO_PKG_VERSION").into(),
+            calibration: None,
+        }
     }
 }
 

@@ -97,7 +97,10 @@ fn pairs(args: &BatchArgs) -> Result<Vec<Pair>> {
 enum Outcome {
     Kept,
     /// Made now, in place of an older one or for the first time.
-    Made { anew: bool, quality: Value },
+    Made {
+        anew: bool,
+        quality: Value,
+    },
 }
 
 /// Refuses a folder whose maps would replace what the command reads.
@@ -112,7 +115,13 @@ fn check_outputs(args: &BatchArgs, pairs: &[Pair]) -> Result<()> {
     inputs.check(&outs)
 }
 
-fn match_pair(pair: &Pair, key: &str, partial: bool, shapes: &mut Shapes, console: &Console) -> Result<Match> {
+fn match_pair(
+    pair: &Pair,
+    key: &str,
+    partial: bool,
+    shapes: &mut Shapes,
+    console: &Console,
+) -> Result<Match> {
     let target = shapes.get(&pair.target, None, console)?;
     let whole_area = partial.then(|| target.shape.full_mesh.area());
     let source = shapes.get(&pair.source, whole_area, console)?;

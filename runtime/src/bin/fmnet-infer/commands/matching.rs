@@ -27,8 +27,7 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     let (name_source, name_target) = (file_name(&args.source), file_name(&args.target));
     let [described_source, described_target] =
         matcher.describe_pair((&name_source, &source), (&name_target, &target), args.partial, &observer)?;
-    let result =
-        matcher.match_with_landmarks(&described_source, &described_target, &landmarks, &observer)?;
+    let result = matcher.match_with_landmarks(&described_source, &described_target, &landmarks, &observer)?;
     let text = summary_text(&result, start.elapsed().as_secs_f64());
     for path in &args.outputs {
         let (map, caption) = (&result.map, text.as_str());
