@@ -157,7 +157,9 @@ impl Sculptor {
     fn leg_joints(&self) -> [Vec3; 4] {
         let (hip, legs) = (self.at([0.034, -0.018, -0.035]), self.to.legs);
         let thigh = 0.6 + 0.4 * legs.min(1.4);
-        let knee = vec3::add(hip, vec3::scale([0.01, -0.045, 0.03], thigh));
+        // Large feet must not touch each other.
+        let apart = 0.03 * (self.to.foot - 1.0).max(0.0);
+        let knee = vec3::add(hip, vec3::add(vec3::scale([0.01, -0.045, 0.03], thigh), [apart, 0.0, 0.0]));
         let hock = vec3::add(knee, [0.0, -0.055 * legs, -0.035 * legs.sqrt()]);
         let ball = vec3::add(hock, [0.004, -0.07 * legs, 0.014 * legs.sqrt()]);
         [hip, knee, hock, ball]

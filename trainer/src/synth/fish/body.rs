@@ -105,7 +105,8 @@ impl Sculptor {
             [([DORSAL, MIDDLE], self.dorsal(), self.to.dorsal), ([ANAL, REAR], self.anal(), self.to.anal)]
         {
             let join = Join { bones: &bones[..1], blend: 0.018 * size.min(1.0) };
-            let wide = 0.03 * size.min(1.0);
+            // Low fins are wide enough to leave no hole between their ends.
+            let wide = 0.03 * (1.75 * size).min(1.0);
             self.fin(join, lerp(front, rear, 0.3), tip, [1.2 * wide, 0.75 * wide], SIDEWAYS);
             let low = lerp(rear, tip, 0.35);
             self.fin(join, lerp(front, rear, 0.1), low, [wide, 0.8 * wide], SIDEWAYS);

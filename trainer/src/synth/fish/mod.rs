@@ -63,7 +63,7 @@ proportions! {
 }
 
 fn recipe(proportions: &Proportions) -> Recipe {
-    let mut sculptor = Sculptor { recipe: Recipe::new(0.0058), to: *proportions };
+    let mut sculptor = Sculptor { recipe: Recipe::new(0.0045), to: *proportions };
     sculptor.bones();
     sculptor.trunk();
     sculptor.head();
@@ -115,7 +115,7 @@ impl Sculptor {
     fn dorsal(&self) -> [Vec3; 3] {
         let (size, half) = (self.to.dorsal, 0.09 * self.to.dorsal_length);
         let (front, rear) = (self.at([0.0, 0.105, half - 0.01]), self.at([0.0, 0.088, -half - 0.02]));
-        let tip = [0.0, front[1] + 0.085 * size, rear[2] + 0.04 * self.to.length - 0.05 * size];
+        let tip = [0.0, front[1] + 0.085 * size, rear[2] + 0.04 - 0.05 * size];
         [front, rear, tip]
     }
 

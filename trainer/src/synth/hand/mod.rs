@@ -75,7 +75,7 @@ const FINGERS: [[f64; 5]; 4] = [
 const JOINTS: [f64; 4] = [0.0, 0.46, 0.74, 0.93];
 
 fn recipe(proportions: &Proportions) -> Recipe {
-    let mut recipe = Recipe::new(0.00175);
+    let mut recipe = Recipe::new(0.0014);
     recipe.symmetry = Symmetry::None;
     let mut sculptor = Sculptor { recipe, to: *proportions };
     sculptor.bones();

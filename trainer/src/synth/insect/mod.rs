@@ -67,7 +67,7 @@ const LEG_NAMES: [[&str; 3]; 3] = [
 ];
 
 fn recipe(proportions: &Proportions) -> Recipe {
-    let mut sculptor = Sculptor { recipe: Recipe::new(0.0042), to: *proportions };
+    let mut sculptor = Sculptor { recipe: Recipe::new(0.0032), to: *proportions };
     sculptor.bones();
     sculptor.trunk();
     sculptor.head();
