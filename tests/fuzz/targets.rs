@@ -6,14 +6,15 @@ use fmnet::cache::{Cache, Lookup};
 use fmnet::descriptor::ShotOptions;
 use fmnet::events::ignore;
 use fmnet::io::{
-    Attributes, IntegerField, IntegerKind, Joint, NpyArray, NpyKind, Skin, Texture, decode_mesh, read_matrix,
-    read_npy, read_point_map, read_surface_points, read_vector, write_matrix, write_mesh, write_npy,
-    write_point_map, write_surface_points,
+    Attributes, IntegerField, IntegerKind, Joint, NpyArray, NpyKind, Skin, Texture, decode_mesh,
+    read_landmarks, read_matrix, read_npy, read_point_map, read_surface_points, read_vector, write_matrix,
+    write_mesh, write_npy, write_point_map, write_surface_points,
 };
 use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
 use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::network::contract::ModelInput;
 use fmnet::network::{Backend, DescriptorNetwork};
+use fmnet::pipeline::{DescribedShape, DescriptorKind, MatchOptions, Matcher};
 use fmnet::point_map::PointMap;
 use fmnet::shape::{Context, Shape, ShapeOptions};
 use fmnet::{Matrix, Mesh};
@@ -32,7 +33,7 @@ use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
 /// Every target.
-pub(super) const NAMES: [&str; 20] = [
+pub(super) const NAMES: [&str; 22] = [
     "off",
     "ply",
     "obj",
@@ -53,6 +54,8 @@ pub(super) const NAMES: [&str; 20] = [
     "config.toml",
     "checkpoint",
     "cache",
+    "landmarks",
+    "described",
 ];
 
 /// Takes a file's bytes; whether the reader accepted them.
@@ -104,6 +107,8 @@ pub(super) fn make(name: &str, folder: &Path) -> Target {
         "config.toml" => configs(folder),
         "checkpoint" => checkpoints(folder),
         "cache" => cache_entries(folder),
+        "landmarks" => landmarks(folder),
+        "described" => described(),
         _ => panic!("there is no target {name}"),
     }
 }
@@ -304,7 +309,8 @@ fn shapes(folder: &Path) -> Target {
 fn maps(name: &str, folder: &Path) -> Target {
     let path = folder.join(name);
     let (targets, confidence) = (vec![1, 0, PointMap::UNMATCHED], Some(vec![0.5, 1.0, 0.0]));
-    write_point_map(&path, &PointMap { targets, confidence, points: None, n_target: 2 }).unwrap();
+    let points = Some(vec![Some(SurfacePoint { face: 3, weights: [0.25, 0.5, 0.25] }), None, None]);
+    write_point_map(&path, &PointMap { targets, confidence, points, n_target: 2 }).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let wide: Vec<u8> = [&[0xFF, 0xFE][..], &bytes.iter().flat_map(|&b| [b, 0]).collect::<Vec<_>>()].concat();
     let seeds = if name == "map.npy" { vec![bytes] } else { vec![bytes, wide] };
@@ -312,6 +318,28 @@ fn maps(name: &str, folder: &Path) -> Target {
         std::fs::write(&path, bytes).unwrap();
         read_point_map(&path, None).is_ok() | read_point_map(&path, Some(2)).is_ok()
     })
+}
+
+fn landmarks(folder: &Path) -> Target {
+    let path = folder.join("landmarks.txt");
+    let seeds = vec![b"# nose\n3 7\n\n5\n 1e1 2\n".to_vec(), b"\xFF\xFE1\x00\n\x00".to_vec()];
+    Target::new(seeds, move |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        read_landmarks(&path).is_ok()
+    })
+}
+
+fn described() -> Target {
+    let options = MatchOptions {
+        descriptor: DescriptorKind::Shot,
+        k: Some(5),
+        shot_radius: Some(0.3),
+        subdivide: Some(None),
+        ..MatchOptions::default()
+    };
+    let matcher = Matcher::new(&options).unwrap();
+    let shape = matcher.describe("fuzz", &bumpy_sphere(1, 1), &ignore).unwrap();
+    Target::new(vec![shape.encode()], |bytes| DescribedShape::decode(bytes, Path::new("a.fms")).is_ok())
 }
 
 fn matrices(folder: &Path) -> Target {
@@ -356,8 +384,8 @@ fn models() -> Target {
         [true, false].map(|per_shape| to_onnx(&network, &test_metadata(per_shape)).unwrap()).into();
     seeds.push(to_onnx(&diffusion, &test_metadata(false)).unwrap());
     let target = Target::new(seeds, move |bytes| {
-        let network = DescriptorNetwork::from_bytes(Path::new("model.onnx"), bytes, Backend::Tract);
-        network.is_ok_and(|network| runs(&network))
+        let loads = |backend| DescriptorNetwork::from_bytes(Path::new("model.onnx"), bytes, backend);
+        [Backend::Native, Backend::Tract].into_iter().all(|b| loads(b).is_ok_and(|network| runs(&network)))
     });
     target.with_memory(256 << 20)
 }
