@@ -54,11 +54,11 @@ fn check(name: &str, network: &dyn Network, per_shape: bool, input: &Input) {
         assert!(difference < TOLERANCE, "{other} differs by {difference}");
     };
     agrees("tract", &input.run(&DescriptorNetwork::load(&model, Backend::Tract).unwrap()));
-    let default = DescriptorNetwork::load(&model, Backend::Native).unwrap();
-    let native = default.native().is_some();
+    let own = DescriptorNetwork::load(&model, Backend::Native).unwrap();
+    let native = own.native().is_some();
     assert_eq!(native, !per_shape && name != "running", "{name}: only our DiffusionNets run natively");
-    assert_eq!(default.backend(), if native { Backend::Native } else { Backend::Tract });
-    agrees("the default", &input.run(&default));
+    assert_eq!(own.backend(), if native { Backend::Native } else { Backend::Tract });
+    agrees("native", &input.run(&own));
     check_ort(&model, input, &agrees);
     check_python(&model, input, folder.path(), &agrees);
     check_javascript(&model, input, folder.path(), &agrees, expected.cols());

@@ -26,7 +26,7 @@ _Descriptor = Literal["learned", "shot"]
 _Solver = Literal["least-squares", "regularized", "bidirectional", "joint", "part"]
 _Refinement = Literal["none", "icp", "zoomout", "wavelet", "pmf", "shared-triangulation"]
 _Upscaling = Literal["surface", "l21", "least-squares"]
-_Backend = Literal["native", "tract"]
+_Backend = Literal["tract", "native"]
 _Effort = Literal["low", "normal", "high"]
 _Vertices = Union[int, Literal["off"]]
 _Side = Literal["source", "target"]
@@ -145,7 +145,7 @@ class Matcher:
         subdivide: _Vertices | None = None,
         shot_radius: float | None = None,
         cache: _Path | None = None,
-        backend: _Backend = "native",
+        backend: _Backend = "tract",
     ) -> Matcher: ...
     @property
     def k(self) -> int: ...
@@ -190,7 +190,7 @@ def match(
     subdivide: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
-    backend: _Backend = "native",
+    backend: _Backend = "tract",
 ) -> Match: ...
 def features(
     mesh: _Mesh,
@@ -202,7 +202,7 @@ def features(
     decimate: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
-    backend: _Backend = "native",
+    backend: _Backend = "tract",
 ) -> dict[str, NDArray[Any]]: ...
 def eigenbasis(mesh: _Mesh, k: int, *, unit_area: bool = True) -> Eigenbasis: ...
 def shot(

@@ -1,8 +1,8 @@
 //! The descriptor network: the model file's contract, and its back-ends.
 //!
-//! A model is an ONNX file ([`contract`]). The DiffusionNets that `fmnet-train` writes run on the library's own kernels
-//! ([`NativeNetwork`]); any model runs through tract, which is built in (feature `tract`), or through onnxruntime
-//! (feature `ort`), whose library is loaded at run time from the path in the environment variable `ORT_DYLIB_PATH`.
+//! A model is an ONNX file ([`contract`]). It runs through tract, which is built in (feature `tract`), or through onnxruntime
+//! (feature `ort`), whose library is loaded at run time from the path in the environment variable `ORT_DYLIB_PATH`. DiffusionNets that
+//! `fmnet-train` wrote run on the library's own kernels as well ([`NativeNetwork`]), by which they are adapted to a pair.
 
 pub mod contract;
 mod native;
@@ -24,11 +24,12 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
-    /// The library's own kernels, for the DiffusionNets that `fmnet-train` writes; tract for all other models.
-    #[default]
-    Native,
     /// tract, pure Rust, built in.
+    #[default]
     Tract,
+    /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train` writes; tract for
+    /// all other models.
+    Native,
     /// onnxruntime, its library, named by ORT_DYLIB_PATH, loaded at run time; needs the feature `ort`.
     Ort,
 }
