@@ -80,6 +80,6 @@ fn every_candidate_is_listed_and_one_is_taken() {
     assert_eq!(taken.len(), 1);
     let least =
         candidates.iter().map(|c| c["expected_error"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
-    assert_eq!(taken[0]["expected_error"].as_f64().unwrap(), least);
+    assert!(taken[0]["expected_error"].as_f64().unwrap() <= least / 0.9);
     assert_eq!(summary["quality"]["expected_error"], taken[0]["expected_error"]);
 }

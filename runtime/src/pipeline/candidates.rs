@@ -19,6 +19,10 @@ const ADAPTATION: usize = 10;
 /// Probability that the first map is bad from which the cheapest other one is tried.
 const WORTH_A_TRY: f64 = 0.2;
 
+/// Another map is taken if its expected error is below this share of the one so far: the estimate does not tell smaller
+/// differences.
+const CLEARLY: f64 = 0.9;
+
 /// A map before refinement, both ways.
 pub(super) struct Start {
     pub(super) functional_map: Matrix,
@@ -56,9 +60,9 @@ impl Tried {
         Self { found, quality, estimate, candidates: vec![candidate] }
     }
 
-    /// Takes another map if it is better.
+    /// Takes another map if it is clearly better.
     fn add(&mut self, name: &str, found: Found, (quality, estimate): (Quality, Estimate)) {
-        let better = estimate.expected_error < self.estimate.expected_error;
+        let better = estimate.expected_error < CLEARLY * self.estimate.expected_error;
         if better {
             self.candidates.iter_mut().for_each(|candidate| candidate.taken = false);
             (self.found, self.quality, self.estimate) = (found, quality, estimate);

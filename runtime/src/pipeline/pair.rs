@@ -171,10 +171,11 @@ impl Pair<'_> {
             }
             functional_maps(&bases[0], &bases[1], &hats[0], &hats[1], solver)
         })?;
-        if info.rank < self.matcher.k {
+        let k = bases[0].k().min(bases[1].k());
+        if info.rank < k {
             self.warn(&format!(
-                "the descriptors determine only {} of {} dimensions of the functional map",
-                info.rank, self.matcher.k
+                "the descriptors determine only {} of {k} dimensions of the functional map",
+                info.rank
             ));
         }
         Ok((maps, info))
