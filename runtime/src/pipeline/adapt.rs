@@ -12,6 +12,7 @@ use crate::fmap::{
     FmapError, FmapSolution, FmapSolver, multiply, pseudo_inverse, resolvent_mask, scale_free_eigenvalues,
 };
 use crate::network::{NativeInput, NativeNetwork, NetworkError};
+use crate::spectral::Eigenbasis;
 
 type F64 = Matrix;
 
@@ -38,7 +39,8 @@ pub(super) fn adapted(pair: &Pair, network: &NativeNetwork, steps: usize) -> Res
         let arrays: Vec<&[f32]> = arrays.iter().map(|(_, values)| values.as_slice()).collect();
         inputs.push(network.input(described.shape.n(), &arrays));
     }
-    let sides = [Fixed::new(pair, 0)?, Fixed::new(pair, 1)?];
+    let [source, target] = pair.bases(pair.matcher.k())?;
+    let sides = [Fixed::new(&source)?, Fixed::new(&target)?];
     let mut adam = Adam::new(network.parameters().to_vec());
     for _ in 0..steps {
         let runs = [
@@ -106,9 +108,7 @@ struct Fixed {
 }
 
 impl Fixed {
-    fn new(pair: &Pair, side: usize) -> Result<Self, Error> {
-        let [source, target] = pair.bases(pair.matcher.k())?;
-        let basis = if side == 0 { source } else { target };
+    fn new(basis: &Eigenbasis) -> Result<Self, FmapError> {
         let n = basis.n();
         let m = SAMPLES.min(n);
         // Neighbours in a file are often neighbours on the surface: even steps spread well enough.
@@ -116,7 +116,7 @@ impl Fixed {
         let functions = basis.eigenvectors.select_rows(&rows);
         let inverse = pseudo_inverse(&functions)?;
         let analysis = Matrix::from_fn(basis.k(), n, |i, x| basis.eigenvectors[(x, i)] * basis.mass[x]);
-        let eigenvalues = scale_free_eigenvalues(&basis);
+        let eigenvalues = scale_free_eigenvalues(basis);
         Ok(Self { analysis, eigenvalues, rows, functions, inverse })
     }
 }

@@ -2,7 +2,6 @@
 
 use super::Upscaling;
 use super::pair::Pair;
-use crate::Matrix;
 use crate::error::Error;
 use crate::mesh::{Mesh, SurfacePoint, vec3};
 use crate::point_map::{EmbeddedSurface, Embedding, PointMap};
@@ -34,7 +33,7 @@ pub(super) fn on_inputs(
         .map(|place| {
             let place = (*place)?;
             let starts = starts(&place, source.mesh(), map);
-            let row = row(&place, source.mesh(), &embedding.source);
+            let row = place.interpolate(source.mesh(), &embedding.source);
             Some(surface.project(&row, &starts)?.point)
         })
         .collect();
@@ -47,16 +46,9 @@ pub(super) fn on_inputs(
         }
         points[full].map_or(PointMap::UNMATCHED, |point| nearest_corner(&point, input))
     };
-    let confidence_of = |full: usize| -> f32 {
-        let Some(place) = places[full] else { return 0.0 };
-        let corners = source.mesh().faces()[place.face as usize];
-        let doubt: f64 =
-            corners.iter().zip(place.weights).map(|(&v, w)| w * f64::from(doubt[v as usize])).sum();
-        (1.0 - doubt).clamp(0.0, 1.0) as f32
-    };
     let n_full = places.len();
     let targets: Vec<u32> = (0..n_full).map(vertex_of).collect();
-    let confidence: Vec<f32> = (0..n_full).map(confidence_of).collect();
+    let confidence = confidence(&places, source.mesh(), doubt);
     in_input_vertices(source, target, &targets, &confidence, Some(&points))
 }
 
@@ -67,11 +59,16 @@ fn starts(place: &SurfacePoint, mesh: &Mesh, map: &PointMap) -> Vec<u32> {
     corners.iter().zip(&place.weights).filter_map(near).collect()
 }
 
-fn row(place: &SurfacePoint, mesh: &Mesh, rows: &Matrix) -> Vec<f64> {
-    match place.weights.iter().position(|&w| w == 1.0) {
-        Some(corner) => rows.row(mesh.faces()[place.face as usize][corner] as usize).to_vec(),
-        None => place.interpolate(mesh, rows),
-    }
+/// What the doubt of a mesh's vertices leaves at places on it; 0 at those that are nowhere.
+fn confidence(places: &[Option<SurfacePoint>], mesh: &Mesh, doubt: &[f32]) -> Vec<f32> {
+    let left = |place: &Option<SurfacePoint>| {
+        let Some(place) = place else { return 0.0 };
+        let corners = mesh.faces()[place.face as usize];
+        let doubt: f64 =
+            corners.iter().zip(place.weights).map(|(&v, w)| w * f64::from(doubt[v as usize])).sum();
+        (1.0 - doubt).clamp(0.0, 1.0) as f32
+    };
+    places.iter().map(left).collect()
 }
 
 /// The corner of a point's triangle that is nearest to the point, the first of several.
@@ -135,10 +132,6 @@ pub(super) fn full_by_functional_map(
     })?;
     let input = |y: Option<u32>| y.map_or(PointMap::UNMATCHED, |y| target.way_back.input_of_full[y as usize]);
     let targets: Vec<u32> = map.iter().map(input).collect();
-    let confidence: Vec<f32> = source
-        .full_on_work()
-        .iter()
-        .map(|place| place.map_or(0.0, |place| 1.0 - doubt[place.nearest_vertex(source.mesh()) as usize]))
-        .collect();
+    let confidence = confidence(&source.full_on_work(), source.mesh(), doubt);
     Ok((in_input_vertices(source, target, &targets, &confidence, None), info))
 }

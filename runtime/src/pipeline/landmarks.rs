@@ -6,9 +6,8 @@
 use super::pair::Pair;
 use crate::Matrix;
 use crate::error::Error;
-use crate::mesh::SurfacePoint;
-use crate::mesh::vertices_on_surface;
-use crate::point_map::PointMap;
+use crate::mesh::{SurfacePoint, vertices_on_surface};
+use crate::point_map::{PointMap, beside};
 use crate::shape::{Shape, WayBack};
 use crate::spectral::Eigenbasis;
 use thiserror::Error;
@@ -76,7 +75,7 @@ impl Landmarks {
         let factor = (IN_SYSTEM * (squares(&hats[0]) + squares(&hats[1]))
             / (squares(&own[0]) + squares(&own[1])))
         .sqrt();
-        std::array::from_fn(|i| beside(&hats[i], &own[i], factor))
+        std::array::from_fn(|i| beside(&hats[i], &own[i].map(|x| factor * x)))
     }
 
     /// Columns to be set beside the rows of embeddings whose rows have a squared length of `mean_square` in the mean.
@@ -136,13 +135,4 @@ fn warmth(basis: &Eigenbasis, landmarks: &[u32]) -> Matrix {
 
 fn squares(matrix: &Matrix) -> f64 {
     matrix.data().iter().map(|x| x * x).sum()
-}
-
-/// `[left, factor right]`.
-fn beside(left: &Matrix, right: &Matrix, factor: f64) -> Matrix {
-    let width = left.cols();
-    Matrix::from_fn(left.rows(), width + right.cols(), |i, j| match j < width {
-        true => left[(i, j)],
-        false => factor * right[(i, j - width)],
-    })
 }

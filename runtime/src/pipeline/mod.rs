@@ -27,12 +27,12 @@ use crate::events::{Event, Observer};
 use crate::fmap::{FmapInfo, FmapSolver};
 use crate::network::DescriptorNetwork;
 use crate::point_map::PointMap;
-use crate::quality::{Calibration, Estimate, Quality};
+use crate::quality::{Calibration, Estimate, Quality, SPECTRAL_K};
 use crate::refine::PmfInfo;
 use crate::shape::{Context, Shape, ShapeOptions};
 use crate::upscale::AdmmInfo;
 use crate::{Matrix, Mesh};
-use pair::{Pair, QUALITY_K};
+use pair::Pair;
 use std::path::Path;
 
 pub use candidates::Candidate;
@@ -269,7 +269,7 @@ impl Matcher {
             )));
         }
         // Asked for once at its largest, the eigenbasis serves every smaller one, the same for every pair.
-        let wanted = self.refined_k(&shape).max(described_k.max(QUALITY_K).min(shape.max_eigenpairs()));
+        let wanted = self.refined_k(&shape).max(described_k.max(SPECTRAL_K).min(shape.max_eigenpairs()));
         shape.eigenbasis(wanted, context)?;
         let descriptors = self.descriptor().describe(&shape, context)?;
         Ok(DescribedShape { shape, descriptors, described_by: self.descriptor_key() })

@@ -10,16 +10,13 @@ use crate::events::{Event, timed};
 use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
 use crate::point_map::{Comparison, Embedding, PointMap};
-use crate::quality::{Estimate, Quality, Side, SurfaceFrame, doubt};
+use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
 use crate::refine::{
     IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletOptions, ZoomOutOptions, icp, pmf, wavelet, zoomout,
 };
 use crate::shape::Context;
 use crate::spectral::{Eigenbasis, Laplacian};
 use std::sync::Arc;
-
-/// Eigenfunctions that quality is measured with, at least, where a shape has them.
-pub(super) const QUALITY_K: usize = 30;
 
 pub(super) struct Pair<'a> {
     pub(super) matcher: &'a Matcher,
@@ -278,7 +275,7 @@ impl Pair<'_> {
 
     fn judge(&self) -> Result<Judge<'_>, Error> {
         let shapes = [&self.source.shape, &self.target.shape];
-        let k = QUALITY_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
+        let k = SPECTRAL_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
         Ok(Judge {
             pair: self,
             bases: self.bases(k)?,

@@ -143,7 +143,7 @@ fn nearest(queries: &Matrix, rows: &Matrix) -> Result<PointMap, RecoverError> {
 }
 
 /// `[left, right]`, two matrices of as many rows beside each other.
-fn beside(left: &Matrix, right: &Matrix) -> Matrix {
+pub(crate) fn beside(left: &Matrix, right: &Matrix) -> Matrix {
     let rows = (0..left.rows()).flat_map(|i| left.row(i).iter().chain(right.row(i)).copied());
     Matrix::from_vec(left.rows(), left.cols() + right.cols(), rows.collect())
 }

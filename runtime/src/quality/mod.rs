@@ -21,7 +21,7 @@ pub use estimate::{Calibration, Estimate};
 pub use surface::SurfaceFrame;
 
 /// Eigenfunctions of the spectral measures: more of them see noise that does not matter.
-const SPECTRAL_K: usize = 30;
+pub(crate) const SPECTRAL_K: usize = 30;
 
 /// One of the two shapes of a map, as the measures see it.
 #[derive(Clone, Copy, Debug)]

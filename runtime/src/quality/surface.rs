@@ -1,7 +1,7 @@
 //! Measures of how a map bends, stretches, tears and turns the surface.
 
 use super::Side;
-use crate::mesh::{Mesh, vec3};
+use crate::mesh::{Mesh, Topology, vec3};
 use crate::point_map::PointMap;
 
 /// An edge that becomes so many times longer is torn.
@@ -22,18 +22,13 @@ impl SurfaceFrame {
     /// The frame of a mesh.
     pub fn new(mesh: &Mesh) -> Self {
         let mut normals = vec![[0.0; 3]; mesh.n_vertices()];
-        let mut edges = Vec::with_capacity(3 * mesh.n_faces());
         for (face, corners) in mesh.faces().iter().enumerate() {
             let cross = mesh.face_cross(face);
-            for (i, &v) in corners.iter().enumerate() {
+            for &v in corners {
                 normals[v as usize] = vec3::add(normals[v as usize], cross);
-                let w = corners[(i + 1) % 3];
-                edges.push([v.min(w), v.max(w)]);
             }
         }
-        edges.sort_unstable();
-        edges.dedup();
-        Self { normals, unit: mesh.scale(), edges }
+        Self { normals, unit: mesh.scale(), edges: Topology::new(mesh).edges().to_vec() }
     }
 }
 
