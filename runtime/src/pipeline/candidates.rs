@@ -2,7 +2,7 @@
 
 use super::adapt::adapted;
 use super::landmarks::Landmarks;
-use super::pair::{Found, Judge, Pair};
+use super::pair::{Found, Judge, Pair, of_length};
 use super::{Effort, Refinement};
 use crate::Matrix;
 use crate::error::Error;
@@ -10,7 +10,6 @@ use crate::fmap::{FmapSolver, SolverKind};
 use crate::network::NativeNetwork;
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::quality::{Estimate, Quality};
-use crate::refine::WaveletOptions;
 use serde::{Deserialize, Serialize};
 
 /// Steps of the adaptation of a doubtful pair.
@@ -24,6 +23,7 @@ const WORTH_A_TRY: f64 = 0.2;
 const CLEARLY: f64 = 0.9;
 
 /// A map before refinement, both ways.
+#[derive(Clone)]
 pub(super) struct Start {
     pub(super) functional_map: Matrix,
     pub(super) map: PointMap,
@@ -89,10 +89,10 @@ impl Pair<'_> {
         let all = self.matcher.effort == Effort::High || self.matcher.adapt.is_some_and(|steps| steps > 0);
         let more = self.matcher.effort != Effort::Low;
         if all || more && tried.estimate.bad > WORTH_A_TRY {
-            let rough = WaveletOptions::coarse_to_fine(self.matcher.k, self.refined_k());
-            let found = self.wavelet(start, &rough)?;
+            let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
+            let found = self.refine(Refinement::Wavelet, &start)?;
             let judged = judge.judge(&found)?;
-            tried.add("coarse to fine", found, judged);
+            tried.add("without descriptors beside", found, judged);
         }
         if all || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;
@@ -107,27 +107,20 @@ impl Pair<'_> {
         tried: &mut Tried,
         landmarks: Option<&Landmarks>,
     ) -> Result<(), Error> {
-        let (matcher, k) = (self.matcher, self.refined_k());
-        let rough = WaveletOptions::coarse_to_fine(matcher.k, k);
-        let mut attempt = |name: &str, found: Result<Found, Error>| -> Result<(), Error> {
-            let found = found?;
+        let k = self.matcher.k;
+        let own = [&self.source.descriptors, &self.target.descriptors];
+        let mut attempt = |name: &str, start: &Start| -> Result<(), Error> {
+            let found = self.refine(Refinement::Wavelet, start)?;
             let judged = judge.judge(&found)?;
             tried.add(name, found, judged);
             Ok(())
         };
-        let features = Start { anchors: start.anchors.clone(), ..self.by_features()? };
-        attempt("features alone", self.refine(Refinement::Wavelet, &features))?;
-        attempt("features alone, coarse to fine", self.wavelet(&features, &rough))?;
-        for (name, k, weight) in [("k = 50", 50, 0.1), ("strong mask", matcher.k, 1.0)] {
-            let own = [&self.source.descriptors, &self.target.descriptors];
-            let start = self.solved(own, k.min(matcher.k), weight, landmarks)?;
-            attempt(name, self.wavelet(&start, &rough))?;
-        }
+        attempt("features alone", &Start { anchors: start.anchors.clone(), ..self.by_features()? })?;
+        attempt("k = 50", &self.solved(own, k.min(50), 0.1, landmarks)?)?;
+        attempt("strong mask", &self.solved(own, k, 1.0, landmarks)?)?;
         if let Some((network, steps)) = self.adaptation() {
             let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
-            let start = self.solved([&source, &target], matcher.k, 0.1, landmarks)?;
-            attempt("adapted", self.refine(Refinement::Wavelet, &start))?;
-            attempt("adapted, coarse to fine", self.wavelet(&start, &rough))?;
+            attempt("adapted", &self.solved([&source, &target], k, 0.1, landmarks)?)?;
         }
         Ok(())
     }
@@ -140,7 +133,7 @@ impl Pair<'_> {
 
     /// Nearest neighbours among the descriptors, without a functional map.
     fn by_features(&self) -> Result<Start, Error> {
-        let [source, target] = [self.source, self.target].map(|described| normalised(&described.descriptors));
+        let [source, target] = [self.source, self.target].map(|described| of_length(1.0, &described.descriptors));
         let embedding = Embedding::of_rows(source, target).map_err(RecoverError::from)?;
         let [map, back] = embedding.both()?;
         let [phi, psi] = self.bases(self.matcher.k)?;
@@ -159,19 +152,6 @@ impl Pair<'_> {
         let bases = self.bases(k)?;
         let solver = FmapSolver::new(SolverKind::Joint, Some(weight));
         let (maps, _) = self.functional_maps(descriptors, &bases, solver, landmarks)?;
-        self.start(&maps, Comparison::Joint, &bases, landmarks)
+        self.start(descriptors, &maps, Comparison::Joint, &bases, landmarks)
     }
-}
-
-/// Rows of length 1, in double precision.
-fn normalised(rows: &Matrix<f32>) -> Matrix {
-    let mut rows = rows.map(f64::from);
-    for i in 0..rows.rows() {
-        let row = rows.row_mut(i);
-        let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if length > 0.0 {
-            row.iter_mut().for_each(|x| *x /= length);
-        }
-    }
-    rows
 }

@@ -1,9 +1,12 @@
 //! Both shapes in one space, in which the nearest rows give the point maps.
 
 use super::recover::{Comparison, check_shape, cosines, transport};
-use super::search::{NearestRows, SearchError, mutual_nearest_by, nearest_rows, squared_norms};
+use super::search::{
+    NearestRows, SearchError, check_finite, mutual_climb, mutual_nearest_by, nearest_rows, squared_norms,
+};
 use super::{PointMap, RecoverError};
 use crate::Matrix;
+use crate::mesh::Adjacency;
 use crate::spectral::Eigenbasis;
 
 /// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
@@ -110,23 +113,46 @@ impl Embedding {
     /// # Errors
     /// If an entry is not finite, or a shape has no vertices.
     pub fn both(&self) -> Result<[PointMap; 2], RecoverError> {
-        let [forth, back] = self.matches()?;
+        Ok(self.point_maps(self.matches()?))
+    }
+
+    /// The point maps of matches, source to target first, with the cosines between their rows.
+    pub(crate) fn point_maps(&self, [forth, back]: [Vec<u32>; 2]) -> [PointMap; 2] {
         let map = |queries: &Matrix, rows: &Matrix, targets: Vec<u32>| {
             let confidence = Some(cosines(queries, rows, &targets));
             PointMap { targets, confidence, points: None, n_target: rows.rows() }
         };
-        Ok([map(&self.source, &self.target, forth), map(&self.target, &self.source, back)])
+        [map(&self.source, &self.target, forth), map(&self.target, &self.source, back)]
+    }
+
+    /// Matches near the given ones, along the edges of both meshes: rows that none of their neighbours is nearer than.
+    ///
+    /// # Errors
+    /// If a row of a shape is not finite.
+    pub(crate) fn matches_near(
+        &self,
+        [forth, back]: &[Vec<u32>; 2],
+        around: [&Adjacency; 2],
+    ) -> Result<[Vec<u32>; 2], SearchError> {
+        check_finite(&self.source, "queries")?;
+        check_finite(&self.target, "targets")?;
+        let squares = [squared_norms(&self.source), squared_norms(&self.target)];
+        Ok(mutual_climb(self.factors(), [&squares[0], &squares[1]], [forth, back], around))
+    }
+
+    /// Matrices whose products are those of the rows.
+    fn factors(&self) -> [&Matrix; 2] {
+        match &self.factors {
+            Some([left, right]) => [left, right],
+            None => [&self.source, &self.target],
+        }
     }
 
     /// The matches of [`Embedding::both`].
     pub(crate) fn matches(&self) -> Result<[Vec<u32>; 2], SearchError> {
         if self.source.rows().saturating_mul(self.target.rows()) <= MOST_PRODUCTS {
             let squares = [squared_norms(&self.source), squared_norms(&self.target)];
-            let [left, right] = match &self.factors {
-                Some([left, right]) => [left, right],
-                None => [&self.source, &self.target],
-            };
-            return mutual_nearest_by([left, right], [&squares[0], &squares[1]]);
+            return mutual_nearest_by(self.factors(), [&squares[0], &squares[1]]);
         }
         let (forth, back) = rayon::join(
             || nearest_rows(&self.source, &self.target),

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
 pub use pmf::{PmfHints, PmfInfo, PmfOptions, pmf};
-pub use wavelet::{RefinedBoth, WaveletInfo, WaveletOptions, WaveletStage, wavelet};
+pub use wavelet::{RefinedBoth, WaveletHints, WaveletInfo, WaveletOptions, WaveletStage, wavelet};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.

@@ -11,6 +11,7 @@ use super::zoomout::least_squares_map;
 use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
+use crate::mesh::{Adjacency, Mesh, Topology};
 use crate::point_map::{Comparison, Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
@@ -27,36 +28,44 @@ pub struct WaveletStage {
 /// Options of [`wavelet`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveletOptions {
-    /// One after the other. At least one; default 5 rounds at 200 eigenfunctions.
+    /// One after the other. At least one; default 3 rounds at 60 eigenfunctions, 2 at 128, 3 at 200.
     pub stages: Vec<WaveletStage>,
-    /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: what is known
-    /// beforehand, such as landmarks. Default none.
-    pub anchors: Option<Box<[Matrix; 2]>>,
     /// Whether the source is a part of the target, which is refused: a part has no map back from all of the target. Default
     /// false.
     pub part: bool,
 }
 
+/// What else is known of a pair.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WaveletHints<'a> {
+    /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: descriptors, or
+    /// landmarks.
+    pub anchors: Option<&'a [Matrix; 2]>,
+    /// The meshes that the bases are of, source and target. With them the rounds after the first stage, or the first round of a single
+    /// one, search along the edges from the match before, which takes a tenth of the time; without them, through all vertices.
+    pub meshes: Option<[&'a Mesh; 2]>,
+}
+
 const COARSE_TO_FINE: [WaveletStage; 3] = [
-    WaveletStage { k: 60, rounds: 5 },
-    WaveletStage { k: 128, rounds: 3 },
-    WaveletStage { k: 200, rounds: 2 },
+    WaveletStage { k: 60, rounds: 3 },
+    WaveletStage { k: 128, rounds: 2 },
+    WaveletStage { k: 200, rounds: 3 },
 ];
 
 impl Default for WaveletOptions {
     fn default() -> Self {
-        Self::at(200)
+        Self::coarse_to_fine(200, 200)
     }
 }
 
 impl WaveletOptions {
     /// Five rounds at `k` eigenfunctions: for a start that is right up to details.
     pub fn at(k: usize) -> Self {
-        Self { stages: vec![WaveletStage { k, rounds: 5 }], anchors: None, part: false }
+        Self { stages: vec![WaveletStage { k, rounds: 5 }], part: false }
     }
 
-    /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 5 rounds at 60, 3 at 128, 2 at 200. For a start of
-    /// which only the rough is right; what it has of details gets lost.
+    /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 3 rounds at 60, 2 at 128, 3 at 200. For a start of
+    /// which the rough is right; what it has of details the descriptors beside the embedding keep.
     pub fn coarse_to_fine(k_start: usize, k_max: usize) -> Self {
         let mut stages: Vec<WaveletStage> =
             COARSE_TO_FINE.into_iter().filter(|stage| stage.k < k_max).collect();
@@ -65,7 +74,7 @@ impl WaveletOptions {
         }
         let rounds = COARSE_TO_FINE[if stages.is_empty() { 0 } else { COARSE_TO_FINE.len() - 1 }].rounds;
         stages.push(WaveletStage { k: k_max, rounds });
-        Self { stages, anchors: None, part: false }
+        Self { stages, part: false }
     }
 }
 
@@ -102,17 +111,19 @@ pub struct RefinedBoth<Info> {
 /// Distances are compared in single precision where the shapes are small, as [`crate::point_map::Embedding::both`] does.
 ///
 /// # Errors
-/// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map does not fit the bases or matches
-/// nothing, or an entry of a basis is not finite.
+/// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
+/// bases, a map matches nothing, or an entry of a basis is not finite.
 pub fn wavelet(
     maps: [&PointMap; 2],
     basis_source: &Eigenbasis,
     basis_target: &Eigenbasis,
+    hints: WaveletHints,
     options: &WaveletOptions,
 ) -> Result<RefinedBoth<WaveletInfo>, RefineError> {
     check(options)?;
     check_bases(basis_source, basis_target)?;
     let bases = [basis_source, basis_target];
+    check_hints(hints, bases)?;
     for (map, [from, to]) in maps.into_iter().zip([bases, [basis_target, basis_source]]) {
         // Checks the whole point map, whatever the first round will use of it.
         functional_map_of(map, &from.truncated(1), &to.truncated(1))?;
@@ -120,49 +131,83 @@ pub fn wavelet(
             return Err(RefineError::NothingMatched);
         }
     }
-    let rounds = rounds(&options.stages, basis_source.k().min(basis_target.k()));
-    let last = rounds.len() - 1;
+    let ks = rounds(&options.stages, basis_source.k().min(basis_target.k()));
+    let last = ks.len() - 1;
     let mut images = maps.map(|map| map.targets.clone());
-    let mut truncated = bases.map(|basis| basis.truncated(rounds[0]));
-    for &k in &rounds[..last] {
-        let maps = filtered_maps(&images, &mut truncated, bases, k)?;
-        images = embedding(&maps, &truncated, options)?.matches()?;
+    let rough = if options.stages.len() > 1 { options.stages[0].rounds } else { 1 };
+    let mut search = Search::new(hints.meshes, rough);
+    let mut level = Level::new(bases, hints.anchors, ks[0]);
+    for &k in &ks[..last] {
+        level = level.at(k, bases);
+        images = search.matches(&level.embedded(&images)?.1, &images)?;
     }
-    let functional_maps = filtered_maps(&images, &mut truncated, bases, rounds[last])?;
-    let embedding = embedding(&functional_maps, &truncated, options)?;
-    let [map, map_back] = embedding.both()?;
-    Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds } })
+    let (functional_maps, embedding) = level.at(ks[last], bases).embedded(&images)?;
+    let [map, map_back] = embedding.point_maps(search.matches(&embedding, &images)?);
+    Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds: ks } })
 }
 
-fn embedding(
-    maps: &BothMaps,
-    [source, target]: &[Eigenbasis; 2],
-    options: &WaveletOptions,
-) -> Result<Embedding, RefineError> {
-    let embedding = maps.embedding(Comparison::Joint, source, target)?;
-    Ok(match options.anchors.as_deref() {
-        Some([of_source, of_target]) => embedding.with_columns(of_source, of_target),
-        None => embedding,
-    })
+/// How the vertices are matched in an embedding.
+struct Search {
+    around: Option<[Adjacency; 2]>,
+    /// Rounds through all vertices that are left.
+    rough: usize,
 }
 
-/// The filtered functional maps, `[k, k]`, of a pair of point maps, between bases that are cut to `k` where they are not.
-fn filtered_maps(
-    [forth, back]: &[Vec<u32>; 2],
-    truncated: &mut [Eigenbasis; 2],
-    bases: [&Eigenbasis; 2],
-    k: usize,
-) -> Result<BothMaps, RefineError> {
-    if truncated[0].k() != k {
-        *truncated = bases.map(|basis| basis.truncated(k));
+impl Search {
+    fn new(meshes: Option<[&Mesh; 2]>, rough: usize) -> Self {
+        Self { around: meshes.map(|meshes| meshes.map(|mesh| Topology::new(mesh).adjacency())), rough }
     }
-    let [source, target] = &*truncated;
-    let (c12, c21) = rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
-    let mask = filter_mask(&scale_free_eigenvalues(source), &scale_free_eigenvalues(target));
-    let filtered = |c: &Matrix, weight: &dyn Fn(usize, usize) -> f64| {
-        Matrix::from_fn(k, k, |i, j| weight(i, j) * c[(i, j)])
-    };
-    Ok(BothMaps { forth: filtered(&c12?, &|i, j| mask[(i, j)]), back: filtered(&c21?, &|i, j| mask[(j, i)]) })
+
+    fn matches(&mut self, embedding: &Embedding, before: &[Vec<u32>; 2]) -> Result<[Vec<u32>; 2], RefineError> {
+        if let (Some([source, target]), 0) = (&self.around, self.rough) {
+            return Ok(embedding.matches_near(before, [source, target])?);
+        }
+        self.rough = self.rough.saturating_sub(1);
+        Ok(embedding.matches()?)
+    }
+}
+
+/// What a round needs of both shapes: `k` eigenfunctions, and columns beside the embedding.
+struct Level<'a> {
+    bases: [Eigenbasis; 2],
+    anchors: Option<&'a [Matrix; 2]>,
+}
+
+impl<'a> Level<'a> {
+    fn new(bases: [&Eigenbasis; 2], anchors: Option<&'a [Matrix; 2]>, k: usize) -> Self {
+        Self { bases: bases.map(|basis| basis.truncated(k)), anchors }
+    }
+
+    /// The same, with `k` eigenfunctions.
+    fn at(self, k: usize, bases: [&Eigenbasis; 2]) -> Self {
+        if self.bases[0].k() == k { self } else { Self::new(bases, self.anchors, k) }
+    }
+
+    /// The filtered functional maps of a pair of point maps, and the embedding in which they compare the vertices.
+    fn embedded(&self, images: &[Vec<u32>; 2]) -> Result<(BothMaps, Embedding), RefineError> {
+        let maps = self.filtered_maps(images)?;
+        let embedding = maps.embedding(Comparison::Joint, &self.bases[0], &self.bases[1])?;
+        let embedding = match self.anchors {
+            Some([of_source, of_target]) => embedding.with_columns(of_source, of_target),
+            None => embedding,
+        };
+        Ok((maps, embedding))
+    }
+
+    /// The filtered functional maps, `[k, k]`, of a pair of point maps.
+    fn filtered_maps(&self, [forth, back]: &[Vec<u32>; 2]) -> Result<BothMaps, RefineError> {
+        let [source, target] = &self.bases;
+        let (c12, c21) =
+            rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
+        let mask = filter_mask(&scale_free_eigenvalues(source), &scale_free_eigenvalues(target));
+        let filtered = |c: &Matrix, weight: &dyn Fn(usize, usize) -> f64| {
+            Matrix::from_fn(c.rows(), c.cols(), |i, j| weight(i, j) * c[(i, j)])
+        };
+        Ok(BothMaps {
+            forth: filtered(&c12?, &|i, j| mask[(i, j)]),
+            back: filtered(&c21?, &|i, j| mask[(j, i)]),
+        })
+    }
 }
 
 /// The functional map by which a point map `T` pulls functions back from the other shape, `[k, k_other]`: `Phi^T A Psi[T]`; where
@@ -190,6 +235,22 @@ fn pull_back(images: &[u32], basis: &Eigenbasis, other: &Eigenbasis) -> Result<M
 fn rounds(stages: &[WaveletStage], k_available: usize) -> Vec<usize> {
     let of_stage = |stage: &WaveletStage| std::iter::repeat_n(stage.k.min(k_available), stage.rounds);
     stages.iter().flat_map(of_stage).collect()
+}
+
+fn check_hints(hints: WaveletHints, [source, target]: [&Eigenbasis; 2]) -> Result<(), RefineError> {
+    let (n_source, n_target) = (source.n(), target.n());
+    if let Some(found) = hints.meshes.map(|meshes| meshes.map(|mesh| mesh.n_vertices()))
+        && found != [n_source, n_target]
+    {
+        return Err(RefineError::Meshes { found, n_source, n_target });
+    }
+    if let Some([a, b]) = hints.anchors
+        && ([a.rows(), b.rows()] != [n_source, n_target] || a.cols() != b.cols())
+    {
+        let found = [a.rows(), a.cols(), b.rows(), b.cols()];
+        return Err(RefineError::Descriptors { found, n_source, n_target });
+    }
+    Ok(())
 }
 
 fn check(options: &WaveletOptions) -> Result<(), RefineError> {

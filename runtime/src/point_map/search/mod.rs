@@ -16,6 +16,7 @@
 //! a plain double loop, for any number of threads.
 
 mod bisect;
+mod climb;
 mod kernels;
 mod leaves;
 mod mutual;
@@ -25,6 +26,7 @@ use crate::Matrix;
 use bisect::Partition;
 use kernels::Kernels;
 use leaves::Leaves;
+pub(crate) use climb::mutual_climb;
 pub(crate) use mutual::{mutual_nearest_by, squared_norms};
 use thiserror::Error;
 
@@ -152,7 +154,7 @@ fn unit_scale(points: &Matrix) -> f64 {
     if exponent.is_finite() { (-exponent.ceil().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
 }
 
-fn check_finite(rows: &Matrix, role: &'static str) -> Result<(), SearchError> {
+pub(crate) fn check_finite(rows: &Matrix, role: &'static str) -> Result<(), SearchError> {
     match rows.data().iter().position(|x| !x.is_finite()) {
         Some(entry) => Err(SearchError::NotFinite { role, row: entry / rows.cols() }),
         None => Ok(()),

@@ -44,7 +44,7 @@ fn refined(
     bases: [&Eigenbasis; 2],
     options: &WaveletOptions,
 ) -> RefinedBoth<WaveletInfo> {
-    wavelet([&maps[0], &maps[1]], bases[0], bases[1], options).unwrap()
+    wavelet([&maps[0], &maps[1]], bases[0], bases[1], WaveletHints::default(), options).unwrap()
 }
 
 #[test]
@@ -89,7 +89,7 @@ fn unmatched_vertices_are_filled_in() {
     assert_eq!(found.map_back.targets, exact.targets);
     let nothing = PointMap::new(vec![PointMap::UNMATCHED; 1200], 1200);
     for maps in [[&nothing, &start], [&start, &nothing]] {
-        let failed = wavelet(maps, &basis, &basis, &WaveletOptions::default());
+        let failed = wavelet(maps, &basis, &basis, WaveletHints::default(), &WaveletOptions::default());
         assert_eq!(failed.unwrap_err(), RefineError::NothingMatched);
     }
 }
@@ -119,7 +119,7 @@ fn stages_begin_at_the_map_s_k_and_end_where_asked() {
     assert_eq!(ks(&rough(100, 250)), [60, 128, 200, 250]);
     assert_eq!(ks(&rough(100, 100)), [60, 100]);
     assert_eq!(ks(&rough(40, 40)), [40]);
-    assert_eq!(WaveletOptions::default(), WaveletOptions::at(200));
+    assert_eq!(WaveletOptions::default(), rough(200, 200));
 }
 
 #[test]
@@ -127,7 +127,9 @@ fn options_out_of_range_and_parts_are_errors() {
     let basis = rectangle(9, 8, 10);
     let map = PointMap::new((0..72).collect(), 72);
     let default = WaveletOptions::default();
-    let fails = |options: &WaveletOptions| wavelet([&map, &map], &basis, &basis, options).unwrap_err();
+    let fails = |options: &WaveletOptions| {
+        wavelet([&map, &map], &basis, &basis, WaveletHints::default(), options).unwrap_err()
+    };
     let stage = |k, rounds| vec![WaveletStage { k, rounds }];
     for (options, name) in [
         (WaveletOptions { stages: Vec::new(), ..default.clone() }, "the number of stages"),
@@ -139,10 +141,10 @@ fn options_out_of_range_and_parts_are_errors() {
     assert!(fails(&WaveletOptions { part: true, ..default.clone() }).to_string().contains("zoomout"));
     let short = PointMap::new(vec![0; 3], 72);
     for maps in [[&short, &map], [&map, &short]] {
-        assert!(matches!(wavelet(maps, &basis, &basis, &default), Err(RefineError::Fmap(_))));
+        assert!(matches!(wavelet(maps, &basis, &basis, WaveletHints::default(), &default), Err(RefineError::Fmap(_))));
     }
     let clamped = refined(&[map.clone(), map.clone()], [&basis, &basis], &default);
-    assert_eq!(clamped.info.rounds, [10; 5]);
+    assert_eq!(clamped.info.rounds, [10; 8]);
 }
 
 #[test]
@@ -157,4 +159,48 @@ fn thread_count_does_not_matter() {
         pool.install(|| refined(&start, [&basis, &basis], &options))
     };
     assert!(run(1) == run(3));
+}
+
+/// A search along the edges finds the exact map as searches through all vertices do.
+#[test]
+fn edges_lead_to_the_same_map() {
+    let (columns, rows) = (50, 60);
+    let source = rectangle(columns, rows, 60);
+    let mesh = crate::mesh::shapes::grid(columns - 1, rows - 1);
+    let order = shuffle(columns * rows);
+    let target = reordered(&flipped(&source), &order);
+    let exact = permutation(&order);
+    let renamed = |face: [u32; 3]| face.map(|x| exact[0].targets[x as usize]);
+    let vertices = order.iter().map(|&x| mesh.vertices()[x as usize]).collect();
+    let other = Mesh::new(vertices, mesh.faces().iter().copied().map(renamed).collect()).unwrap();
+    let start = blurred(&source, &target, &exact, 12);
+    let run = |hints| wavelet([&start[0], &start[1]], &source, &target, hints, &options()).unwrap();
+    for meshes in [None, Some([&mesh, &other])] {
+        let found = run(WaveletHints { meshes, anchors: None });
+        assert_eq!([&found.map.targets, &found.map_back.targets], [&exact[0].targets, &exact[1].targets]);
+    }
+    let pools = [1, 3].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
+    let hints = WaveletHints { meshes: Some([&mesh, &other]), anchors: None };
+    let [one, three] = pools.map(|pool| pool.install(|| run(hints)));
+    assert!(one == three);
+}
+
+/// On a square nothing but columns beside the embedding tells its symmetries apart.
+#[test]
+fn anchors_decide_where_the_eigenfunctions_do_not() {
+    let basis = rectangle(24, 24, 40);
+    let exact = PointMap::new((0..576).collect(), 576);
+    let mirrored = PointMap::new((0..576).map(|x| x / 24 * 24 + 23 - x % 24).collect(), 576);
+    let position = Matrix::from_fn(576, 2, |x, j| 30.0 * ([x / 24, x % 24][j] as f64 / 24.0));
+    let anchors = [position.clone(), position];
+    let run = |anchors| {
+        let hints = WaveletHints { anchors, meshes: None };
+        wavelet([&mirrored, &mirrored], &basis, &basis, hints, &options()).unwrap().map.targets
+    };
+    assert_eq!(run(None), mirrored.targets);
+    assert_eq!(run(Some(&anchors)), exact.targets);
+    let short = [Matrix::zeros(3, 2), Matrix::zeros(576, 2)];
+    let hints = WaveletHints { anchors: Some(&short), meshes: None };
+    let failed = wavelet([&exact, &exact], &basis, &basis, hints, &options()).unwrap_err();
+    assert!(matches!(failed, RefineError::Descriptors { .. }));
 }
