@@ -133,7 +133,8 @@ impl Pair<'_> {
 
     /// Nearest neighbours among the descriptors, without a functional map.
     fn by_features(&self) -> Result<Start, Error> {
-        let [source, target] = [self.source, self.target].map(|described| of_length(1.0, &described.descriptors));
+        let [source, target] =
+            [self.source, self.target].map(|described| of_length(1.0, &described.descriptors));
         let embedding = Embedding::of_rows(source, target).map_err(RecoverError::from)?;
         let [map, back] = embedding.both()?;
         let [phi, psi] = self.bases(self.matcher.k)?;

@@ -12,7 +12,8 @@ use crate::memory;
 use crate::point_map::{Comparison, Embedding, PointMap, beside};
 use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
 use crate::refine::{
-    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf, wavelet, zoomout,
+    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf,
+    wavelet, zoomout,
 };
 use crate::shape::Context;
 use crate::spectral::{Eigenbasis, Laplacian};
@@ -96,7 +97,8 @@ impl Pair<'_> {
         let [n_source, n_target] = [&self.source.shape, &self.target.shape].map(|shape| shape.n());
         let needed = memory::search_bytes(n_source, n_target, width);
         let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
-        let start = self.timed("point map", || self.start(own, &maps, solver.comparison(), &bases, landmarks))?;
+        let start =
+            self.timed("point map", || self.start(own, &maps, solver.comparison(), &bases, landmarks))?;
         let found = self.refine(refinement, &start)?;
         let judge = self.timed("quality", || self.judge())?;
         let tried = self.with_candidates(&judge, &start, found, landmarks)?;

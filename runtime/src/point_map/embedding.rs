@@ -2,7 +2,7 @@
 
 use super::recover::{Comparison, check_shape, cosines, transport};
 use super::search::{
-    NearestRows, SearchError, check_finite, mutual_climb, mutual_nearest_by, nearest_rows, squared_norms,
+    NearestRows, Rows, SearchError, mutual_climb, mutual_nearest, nearest_rows, squared_norms,
 };
 use super::{PointMap, RecoverError};
 use crate::Matrix;
@@ -134,25 +134,30 @@ impl Embedding {
         [forth, back]: &[Vec<u32>; 2],
         around: [&Adjacency; 2],
     ) -> Result<[Vec<u32>; 2], SearchError> {
-        check_finite(&self.source, "queries")?;
-        check_finite(&self.target, "targets")?;
-        let squares = [squared_norms(&self.source), squared_norms(&self.target)];
-        Ok(mutual_climb(self.factors(), [&squares[0], &squares[1]], [forth, back], around))
+        mutual_climb(self.rounded().each_ref(), [forth, back], around)
     }
 
-    /// Matrices whose products are those of the rows.
-    fn factors(&self) -> [&Matrix; 2] {
-        match &self.factors {
+    /// Rows in single precision whose products give the distances.
+    fn rounded(&self) -> [Rows; 2] {
+        let [left, right] = match &self.factors {
             Some([left, right]) => [left, right],
             None => [&self.source, &self.target],
-        }
+        };
+        [
+            Rows::rounded(left, &squared_norms(&self.source)),
+            Rows::rounded(right, &squared_norms(&self.target)),
+        ]
+    }
+
+    /// Whether all products of two shapes' rows take less time than two searches.
+    pub(crate) fn is_small(n_source: usize, n_target: usize) -> bool {
+        n_source.saturating_mul(n_target) <= MOST_PRODUCTS
     }
 
     /// The matches of [`Embedding::both`].
     pub(crate) fn matches(&self) -> Result<[Vec<u32>; 2], SearchError> {
-        if self.source.rows().saturating_mul(self.target.rows()) <= MOST_PRODUCTS {
-            let squares = [squared_norms(&self.source), squared_norms(&self.target)];
-            return mutual_nearest_by(self.factors(), [&squares[0], &squares[1]]);
+        if Self::is_small(self.source.rows(), self.target.rows()) {
+            return mutual_nearest(self.rounded().each_ref());
         }
         let (forth, back) = rayon::join(
             || nearest_rows(&self.source, &self.target),

@@ -6,15 +6,18 @@
 //! functions of unlike frequency fade, the more the farther apart they are, and with them what a wrong match brings in.
 
 mod bands;
+mod single;
 
 use super::zoomout::least_squares_map;
 use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
 use crate::mesh::{Adjacency, Mesh, Topology};
+use crate::point_map::search::{Rows, SearchError, mutual_climb, mutual_nearest};
 use crate::point_map::{Comparison, Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
+use single::SingleRounds;
 
 /// Rounds at one number of eigenfunctions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,7 +111,8 @@ pub struct RefinedBoth<Info> {
 /// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
 /// cosine of the angle between the two rows of the embedding.
 ///
-/// Distances are compared in single precision where the shapes are small, as [`crate::point_map::Embedding::both`] does.
+/// All rounds but the last are in single precision where the shapes are small, and distances are compared in it, as
+/// [`crate::point_map::Embedding::both`] does.
 ///
 /// # Errors
 /// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
@@ -132,17 +136,17 @@ pub fn wavelet(
         }
     }
     let ks = rounds(&options.stages, basis_source.k().min(basis_target.k()));
-    let last = ks.len() - 1;
     let mut images = maps.map(|map| map.targets.clone());
     let rough = if options.stages.len() > 1 { options.stages[0].rounds } else { 1 };
     let mut search = Search::new(hints.meshes, rough);
     let mut level = Level::new(bases, hints.anchors, ks[0]);
-    for &k in &ks[..last] {
+    for &k in &ks[..ks.len() - 1] {
         level = level.at(k, bases);
-        images = search.matches(&level.embedded(&images)?.1, &images)?;
+        images = level.round(&images, &mut search)?;
     }
-    let (functional_maps, embedding) = level.at(ks[last], bases).embedded(&images)?;
-    let [map, map_back] = embedding.point_maps(search.matches(&embedding, &images)?);
+    let (functional_maps, embedding) = level.at(ks[ks.len() - 1], bases).embedded(&images)?;
+    let found = search.in_embedding(&embedding, &images)?;
+    let [map, map_back] = embedding.point_maps(found);
     Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds: ks } })
 }
 
@@ -158,29 +162,62 @@ impl Search {
         Self { around: meshes.map(|meshes| meshes.map(|mesh| Topology::new(mesh).adjacency())), rough }
     }
 
-    fn matches(&mut self, embedding: &Embedding, before: &[Vec<u32>; 2]) -> Result<[Vec<u32>; 2], RefineError> {
-        if let (Some([source, target]), 0) = (&self.around, self.rough) {
-            return Ok(embedding.matches_near(before, [source, target])?);
-        }
+    /// The edges to search along, unless all vertices are to be searched through.
+    fn along(&mut self) -> Option<[&Adjacency; 2]> {
+        let near = self.rough == 0;
         self.rough = self.rough.saturating_sub(1);
-        Ok(embedding.matches()?)
+        self.around.as_ref().filter(|_| near).map(|around| around.each_ref())
+    }
+
+    fn in_embedding(
+        &mut self,
+        embedding: &Embedding,
+        before: &[Vec<u32>; 2],
+    ) -> Result<[Vec<u32>; 2], SearchError> {
+        match self.along() {
+            Some(around) => embedding.matches_near(before, around),
+            None => embedding.matches(),
+        }
+    }
+
+    fn among(&mut self, rows: &[Rows; 2], before: &[Vec<u32>; 2]) -> Result<[Vec<u32>; 2], SearchError> {
+        match self.along() {
+            Some(around) => {
+                mutual_climb(rows.each_ref(), before.each_ref().map(|images| &images[..]), around)
+            }
+            None => mutual_nearest(rows.each_ref()),
+        }
     }
 }
 
-/// What a round needs of both shapes: `k` eigenfunctions, and columns beside the embedding.
+/// What rounds need of both shapes: `k` eigenfunctions, and columns beside the embedding.
 struct Level<'a> {
     bases: [Eigenbasis; 2],
     anchors: Option<&'a [Matrix; 2]>,
+    mask: Matrix,
+    single: SingleRounds,
 }
 
 impl<'a> Level<'a> {
     fn new(bases: [&Eigenbasis; 2], anchors: Option<&'a [Matrix; 2]>, k: usize) -> Self {
-        Self { bases: bases.map(|basis| basis.truncated(k)), anchors }
+        let bases = bases.map(|basis| basis.truncated(k));
+        let mask = filter_mask(&scale_free_eigenvalues(&bases[0]), &scale_free_eigenvalues(&bases[1]));
+        let single = SingleRounds::new(&bases, &mask, anchors);
+        Self { bases, anchors, mask, single }
     }
 
     /// The same, with `k` eigenfunctions.
     fn at(self, k: usize, bases: [&Eigenbasis; 2]) -> Self {
         if self.bases[0].k() == k { self } else { Self::new(bases, self.anchors, k) }
+    }
+
+    /// The matches of a round; in single precision where all vertices had one and are not too many.
+    fn round(&self, images: &[Vec<u32>; 2], search: &mut Search) -> Result<[Vec<u32>; 2], RefineError> {
+        let complete = images.iter().flatten().all(|&image| image != PointMap::UNMATCHED);
+        if complete && Embedding::is_small(self.bases[0].n(), self.bases[1].n()) {
+            return Ok(search.among(&self.single.embedded(images), images)?);
+        }
+        Ok(search.in_embedding(&self.embedded(images)?.1, images)?)
     }
 
     /// The filtered functional maps of a pair of point maps, and the embedding in which they compare the vertices.
@@ -197,15 +234,13 @@ impl<'a> Level<'a> {
     /// The filtered functional maps, `[k, k]`, of a pair of point maps.
     fn filtered_maps(&self, [forth, back]: &[Vec<u32>; 2]) -> Result<BothMaps, RefineError> {
         let [source, target] = &self.bases;
-        let (c12, c21) =
-            rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
-        let mask = filter_mask(&scale_free_eigenvalues(source), &scale_free_eigenvalues(target));
+        let (c12, c21) = rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
         let filtered = |c: &Matrix, weight: &dyn Fn(usize, usize) -> f64| {
             Matrix::from_fn(c.rows(), c.cols(), |i, j| weight(i, j) * c[(i, j)])
         };
         Ok(BothMaps {
-            forth: filtered(&c12?, &|i, j| mask[(i, j)]),
-            back: filtered(&c21?, &|i, j| mask[(j, i)]),
+            forth: filtered(&c12?, &|i, j| self.mask[(i, j)]),
+            back: filtered(&c21?, &|i, j| self.mask[(j, i)]),
         })
     }
 }

@@ -1,20 +1,18 @@
 //! Nearest neighbours from a guess, along the edges of a mesh.
 
+use super::SearchError;
 use super::kernels::Kernels;
-use crate::Matrix;
+use super::mutual::{Rows, check_pair};
 use crate::mesh::Adjacency;
 use rayon::prelude::*;
 
 /// For each row of `queries`, `[q, d]`, a row of `targets`, `[n, d]`, that none of its neighbours is nearer than: downhill from
-/// the best of its own guess, `starts[i]`, and of the guesses of the query's neighbours. Distances are those by the product
-/// `queries targets^T` and the squared norms `squares`, `[n]`, of what the targets' rows stand for; of equally near ones the
-/// lowest is taken.
+/// the best of its own guess, `starts[i]`, and of the guesses of the query's neighbours. Of equally near ones the lowest is taken.
 ///
 /// On a surface in a space of many dimensions distances fall towards the nearest point over many edges, so that a guess a few
 /// edges off leads to it. It costs some ten products a query, where a search costs `n`.
-pub(crate) fn climb(
-    [queries, targets]: [&Matrix; 2],
-    squares: &[f64],
+fn climb(
+    [queries, targets]: [&Rows; 2],
     starts: &[u32],
     [around_query, around_target]: [&Adjacency; 2],
 ) -> Vec<u32> {
@@ -22,17 +20,19 @@ pub(crate) fn climb(
     let from_guesses = |(i, &start): (usize, &u32)| {
         let row = queries.row(i);
         let mut known: Vec<u32> = Vec::with_capacity(64);
-        let mut improve = |best: &mut (f64, u32), candidate: u32| {
+        let mut improve = |best: &mut (f32, u32), candidate: u32| {
             if known.contains(&candidate) {
                 return;
             }
             known.push(candidate);
-            let value = squares[candidate as usize] / 2.0 - kernels.dot(row, targets.row(candidate as usize));
+            let mut product = [0.0];
+            kernels.inner_products(targets.row(candidate as usize), row, &mut product);
+            let value = targets.half_square(candidate as usize) - product[0];
             if (value, candidate) < *best {
                 *best = (value, candidate);
             }
         };
-        let mut best = (f64::INFINITY, start);
+        let mut best = (f32::INFINITY, start);
         improve(&mut best, start);
         around_query.of(i).iter().for_each(|&neighbor| improve(&mut best, starts[neighbor as usize]));
         loop {
@@ -46,20 +46,24 @@ pub(crate) fn climb(
     starts.par_iter().enumerate().map(from_guesses).collect()
 }
 
-/// [`climb`] from both sides between the rows of `a`, `[n_a, d]`, and `b`, `[n_b, d]`, with the squared norms of what they
-/// stand for.
+/// For each row of `a` one of `b` that none of its neighbours is nearer than, and the other way round, from guesses in both
+/// directions, a few edges off. The same for any number of threads.
+///
+/// # Errors
+/// If a set is empty, an entry is not finite, or the widths differ.
 pub(crate) fn mutual_climb(
-    [a, b]: [&Matrix; 2],
-    [a_squares, b_squares]: [&[f64]; 2],
+    [a, b]: [&Rows; 2],
     [forth, back]: [&[u32]; 2],
     [around_a, around_b]: [&Adjacency; 2],
-) -> [Vec<u32>; 2] {
-    [climb([a, b], b_squares, forth, [around_a, around_b]), climb([b, a], a_squares, back, [around_b, around_a])]
+) -> Result<[Vec<u32>; 2], SearchError> {
+    check_pair([a, b])?;
+    Ok([climb([a, b], forth, [around_a, around_b]), climb([b, a], back, [around_b, around_a])])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Matrix;
     use crate::mesh::Topology;
     use crate::mesh::shapes::{bumpy_sphere, permuted};
     use crate::point_map::search::{nearest_rows, squared_norms};
@@ -82,13 +86,8 @@ mod tests {
         let [forth, back] = [nearest_rows(&a, &b).unwrap().index, nearest_rows(&b, &a).unwrap().index];
         let starts = [guesses(&new_of_old, &around[1]), guesses(&back, &around[0])];
         assert!(starts[0] != forth);
-        let squares = [squared_norms(&a), squared_norms(&b)];
-        let found = mutual_climb(
-            [&a, &b],
-            [&squares[0], &squares[1]],
-            [&starts[0], &starts[1]],
-            [&around[0], &around[1]],
-        );
+        let sets = [&a, &b].map(|rows| Rows::rounded(rows, &squared_norms(rows)));
+        let found = mutual_climb(sets.each_ref(), [&starts[0], &starts[1]], around.each_ref()).unwrap();
         assert_eq!(found, [forth, back]);
     }
 }

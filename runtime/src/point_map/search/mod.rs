@@ -24,10 +24,10 @@ mod query;
 
 use crate::Matrix;
 use bisect::Partition;
+pub(crate) use climb::mutual_climb;
 use kernels::Kernels;
 use leaves::Leaves;
-pub(crate) use climb::mutual_climb;
-pub(crate) use mutual::{mutual_nearest_by, squared_norms};
+pub(crate) use mutual::{Rows, mutual_nearest, squared_norms};
 use thiserror::Error;
 
 /// For each query, the nearest target.
@@ -154,8 +154,8 @@ fn unit_scale(points: &Matrix) -> f64 {
     if exponent.is_finite() { (-exponent.ceil().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
 }
 
-pub(crate) fn check_finite(rows: &Matrix, role: &'static str) -> Result<(), SearchError> {
-    match rows.data().iter().position(|x| !x.is_finite()) {
+fn check_finite<T: Copy + Into<f64>>(rows: &Matrix<T>, role: &'static str) -> Result<(), SearchError> {
+    match rows.data().iter().position(|&x| !x.into().is_finite()) {
         Some(entry) => Err(SearchError::NotFinite { role, row: entry / rows.cols() }),
         None => Ok(()),
     }

@@ -18,26 +18,12 @@ const LANES: usize = 16;
 /// For each row `a_x` of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round; of equally
 /// near ones the lowest. The same for any number of threads.
 ///
-/// The squared distance is `s_x + t_y - 2 a_x . b_y`, where `s`, `[n_a]`, and `t`, `[n_b]`, are the squared norms of the rows or what
-/// takes their place.
-///
 /// # Errors
 /// If a set is empty, an entry is not finite, or the widths differ.
-pub(crate) fn mutual_nearest_by(
-    [a, b]: [&Matrix; 2],
-    [a_squares, b_squares]: [&[f64]; 2],
-) -> Result<[Vec<u32>; 2], SearchError> {
-    if a.cols() != b.cols() {
-        return Err(SearchError::WidthMismatch { queries: a.cols(), targets: b.cols() });
-    }
-    if a.rows() == 0 || b.rows() == 0 {
-        return Err(SearchError::NoTargets);
-    }
-    check_finite(a, "queries")?;
-    check_finite(b, "targets")?;
-    let (a, b) = (Rows::new(a, a_squares), Rows::new(b, b_squares));
+pub(crate) fn mutual_nearest([a, b]: [&Rows; 2]) -> Result<[Vec<u32>; 2], SearchError> {
+    check_pair([a, b])?;
     let blocks: Vec<Block> =
-        (0..a.n().div_ceil(ROWS)).into_par_iter().map(|block| Block::new(&a, &b, block * ROWS)).collect();
+        (0..a.n().div_ceil(ROWS)).into_par_iter().map(|block| Block::new(a, b, block * ROWS)).collect();
     let forth = blocks.iter().flat_map(|block| block.forth.iter().map(|best| best.index)).collect();
     let mut back = vec![Best::NONE; b.n()];
     for block in &blocks {
@@ -46,25 +32,53 @@ pub(crate) fn mutual_nearest_by(
     Ok([forth, back.iter().map(|best| best.index).collect()])
 }
 
+/// Whether two sets can be compared.
+pub(super) fn check_pair([a, b]: [&Rows; 2]) -> Result<(), SearchError> {
+    if a.entries.cols() != b.entries.cols() {
+        return Err(SearchError::WidthMismatch { queries: a.entries.cols(), targets: b.entries.cols() });
+    }
+    if a.n() == 0 || b.n() == 0 {
+        return Err(SearchError::NoTargets);
+    }
+    check_finite(&a.entries, "queries")?;
+    check_finite(&b.entries, "targets")
+}
+
 /// The squared norm of each row, `[n]`.
 pub(crate) fn squared_norms(rows: &Matrix) -> Vec<f64> {
     (0..rows.rows()).map(|i| rows.row(i).iter().map(|x| x * x).sum()).collect()
 }
 
-/// Rows in single precision with half of their squared norms, or of what takes their place.
-struct Rows {
+/// Rows in single precision, `[n, d]`, with half of their squared norms, or of what takes their place: the squared distance of a row
+/// `a_x` of one set and `b_y` of another is `2 (s_x + t_y - a_x . b_y)`.
+pub(crate) struct Rows {
     entries: Matrix<f32>,
     half_squares: Vec<f32>,
 }
 
 impl Rows {
-    fn new(rows: &Matrix, squares: &[f64]) -> Self {
-        let half_squares = squares.iter().map(|square| (square / 2.0) as f32).collect();
-        Self { entries: rows.map(|x| x as f32), half_squares }
+    /// Rows `[n, d]` and half of their squared norms, `[n]`.
+    pub(crate) fn new(entries: Matrix<f32>, half_squares: Vec<f32>) -> Self {
+        assert_eq!(entries.rows(), half_squares.len(), "one square for each row");
+        Self { entries, half_squares }
     }
 
-    fn n(&self) -> usize {
+    /// Rows rounded, with their squared norms.
+    pub(crate) fn rounded(rows: &Matrix, squares: &[f64]) -> Self {
+        let half_squares = squares.iter().map(|square| (square / 2.0) as f32).collect();
+        Self::new(rows.map(|x| x as f32), half_squares)
+    }
+
+    pub(super) fn n(&self) -> usize {
         self.entries.rows()
+    }
+
+    pub(super) fn row(&self, i: usize) -> &[f32] {
+        self.entries.row(i)
+    }
+
+    pub(super) fn half_square(&self, i: usize) -> f32 {
+        self.half_squares[i]
     }
 
     fn view(&self, first: usize, count: usize) -> MatRef<'_, f32> {
@@ -162,7 +176,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn mutual_nearest(a: &Matrix, b: &Matrix) -> Result<[Vec<u32>; 2], SearchError> {
-        mutual_nearest_by([a, b], [&squared_norms(a), &squared_norms(b)])
+        super::mutual_nearest([a, b].map(|rows| Rows::rounded(rows, &squared_norms(rows))).each_ref())
     }
 
     fn random(rows: usize, cols: usize, seed: u64) -> Matrix {

@@ -141,7 +141,10 @@ fn options_out_of_range_and_parts_are_errors() {
     assert!(fails(&WaveletOptions { part: true, ..default.clone() }).to_string().contains("zoomout"));
     let short = PointMap::new(vec![0; 3], 72);
     for maps in [[&short, &map], [&map, &short]] {
-        assert!(matches!(wavelet(maps, &basis, &basis, WaveletHints::default(), &default), Err(RefineError::Fmap(_))));
+        assert!(matches!(
+            wavelet(maps, &basis, &basis, WaveletHints::default(), &default),
+            Err(RefineError::Fmap(_))
+        ));
     }
     let clamped = refined(&[map.clone(), map.clone()], [&basis, &basis], &default);
     assert_eq!(clamped.info.rounds, [10; 8]);
