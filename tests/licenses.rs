@@ -77,6 +77,12 @@ fn every_dependency_of_the_python_package_may_be_used() {
     check("python");
 }
 
+/// The page, too.
+#[test]
+fn every_dependency_of_the_page_may_be_used() {
+    check("web");
+}
+
 fn check(folder: &str) {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--all-features", "--locked"])

@@ -67,7 +67,11 @@
 //! # Features
 //!
 //! `tract` (default) runs networks in pure Rust; `ort` runs them by onnxruntime, whose library is loaded from the path in
-//! `ORT_DYLIB_PATH`. Without either, SHOT descriptors still match.
+//! `ORT_DYLIB_PATH`. Without either, networks of `fmnet-train` run on the library's own kernels ([`network::Backend::Native`]), and SHOT
+//! descriptors match. `cli` (default) is for the program `fmnet-infer`: libraries leave it out, with all that it pulls in.
+//!
+//! The library runs in WebAssembly (`wasm32-unknown-unknown`): from bytes to bytes ([`io::decode_mesh`], [`io::encode_point_map`],
+//! [`io::encode_glb`]), on one thread, without a clock and without `.npz`.
 
 pub mod batch;
 pub mod cache;

@@ -3,7 +3,7 @@
 //! A stage that would not fit is refused with its estimate, instead of the machine swapping or the system ending the process.
 //! Estimates are of the stage's peak, from the sizes of what it allocates; the test of this module and `docs/robustness.md` compare
 //! them with what was measured. On Linux the memory available is the least of what the machine, the control group and the
-//! limit of the address space leave; elsewhere it is not known and nothing is refused.
+//! limit of the address space leave, in WebAssembly what 32-bit addresses do; elsewhere it is not known and nothing is refused.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
@@ -115,7 +115,14 @@ pub fn available() -> Option<u64> {
 }
 
 /// Bytes that this process may still take; `None` where that is not known.
-#[cfg(not(target_os = "linux"))]
+#[cfg(target_arch = "wasm32")]
+pub fn available() -> Option<u64> {
+    let pages = core::arch::wasm32::memory_size::<0>() as u64;
+    Some((1 << 32) - (pages << 16))
+}
+
+/// Bytes that this process may still take; `None` where that is not known.
+#[cfg(not(any(target_os = "linux", target_arch = "wasm32")))]
 pub fn available() -> Option<u64> {
     None
 }

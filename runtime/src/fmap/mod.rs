@@ -112,7 +112,8 @@ impl Default for FmapSolver {
 }
 
 /// The kinds of [`FmapSolver`], without their settings, as on command lines and in files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverKind {
     /// The paper's: all coefficients by least squares.
@@ -121,7 +122,7 @@ pub enum SolverKind {
     Regularized,
     /// With the resolvent mask, the mean of both directions.
     #[serde(alias = "two-way")]
-    #[value(alias = "two-way")]
+    #[cfg_attr(feature = "cli", value(alias = "two-way"))]
     Bidirectional,
     /// With the resolvent mask, both directions beside each other.
     Joint,

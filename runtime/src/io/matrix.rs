@@ -197,8 +197,16 @@ pub(super) fn encode<T: NpyNumber>(shape: &[usize], data: &[T]) -> Vec<u8> {
     bytes
 }
 
-/// Writes named arrays, as [`encode`] gives them, as `.npz`: a zip archive without compression.
-pub(super) fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<(), IoError> {
+/// There is no zip archive in WebAssembly.
+#[cfg(target_arch = "wasm32")]
+pub(super) fn npz(path: &Path, _arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, IoError> {
+    let problem = ".npz files are not written in WebAssembly".into();
+    Err(IoError::Unwritable { path: path.into(), problem, remedy: "write a .csv file" })
+}
+
+/// The bytes of a `.npz` file of named arrays, as [`encode`] gives them: a zip archive without compression. `path` is for messages.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, IoError> {
     let written = || -> zip::result::ZipResult<Vec<u8>> {
         let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
         // The date of NumPy's own files, so that the same map gives the same bytes.
@@ -211,9 +219,7 @@ pub(super) fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<(), I
         }
         Ok(archive.finish()?.into_inner())
     };
-    let bytes =
-        written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })?;
-    write_atomically(path, |w| w.write_all(&bytes))
+    written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })
 }
 
 fn write<T: NpyNumber>(path: &Path, shape: &str, data: &[T]) -> Result<(), IoError> {

@@ -5,6 +5,7 @@
 //! - [`read_point_map`] / [`write_point_map`]: `.txt`, `.vts`, `.npy`, `.csv`.
 //! - [`read_surface_points`] / [`write_surface_points`]: `.corr`, points that need not be vertices.
 //! - [`read_matrix`] / [`write_matrix`], [`read_vector`] / [`write_vector`]: NumPy's `.npy`.
+//! - [`decode_mesh`], [`encode_glb`], [`encode_point_map`]: the same in memory, where there are no files.
 //! - [`write_atomically`]: what every writer here goes through.
 //!
 //! Vertex `i` of a file is vertex `i` of the mesh read from it, and the other way round. No reader panics on
@@ -52,7 +53,7 @@ pub use landmarks::read_landmarks;
 pub use matrix::{
     NpyArray, NpyKind, NpyNumber, read_matrix, read_npy, read_vector, write_matrix, write_npy, write_vector,
 };
-pub use point_map::{PointMapFormat, read_point_map, write_point_map};
+pub use point_map::{PointMapFormat, encode_point_map, read_point_map, write_point_map};
 pub use reference::path_from_bytes;
 pub use streams::{print_error_line, print_line};
 pub use surface_points::{read_surface_points, write_surface_points};
@@ -132,16 +133,29 @@ fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
 /// If the format is none of [`MeshFormat::WRITABLE`], an attribute has not the mesh's size, a skin's joint does not exist
 /// or comes before its parent, the mesh is empty and the format `.glb`, or a file cannot be written.
 pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
-    attributes.check(mesh).map_err(|(problem, remedy)| IoError::Unwritable {
-        path: path.into(),
-        problem,
-        remedy,
-    })?;
+    check(path, mesh, attributes)?;
     match MeshFormat::from_path(path) {
         Some(MeshFormat::Off) => off::write(path, mesh, attributes),
         Some(MeshFormat::Ply) => ply::write(path, mesh, attributes),
         Some(MeshFormat::Obj) => obj::write(path, mesh, attributes),
-        Some(MeshFormat::Glb) => gltf::write(path, mesh, attributes),
+        Some(MeshFormat::Glb) => {
+            let bytes = gltf::encode(path, mesh, attributes)?;
+            write_atomically(path, |w| w.write_all(&bytes))
+        }
         _ => Err(IoError::UnknownFormat { path: path.into(), known: MeshFormat::WRITABLE }),
     }
+}
+
+/// The bytes of a `.glb` file as [`write_mesh`] writes it; `path` is for messages, and an image is looked for in its folder.
+///
+/// # Errors
+/// As [`write_mesh`], but for those of the written file.
+pub fn encode_glb(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<Vec<u8>, IoError> {
+    check(path, mesh, attributes)?;
+    gltf::encode(path, mesh, attributes)
+}
+
+fn check(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
+    let unwritable = |(problem, remedy)| IoError::Unwritable { path: path.into(), problem, remedy };
+    attributes.check(mesh).map_err(unwritable)
 }

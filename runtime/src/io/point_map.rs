@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::error::{ParseError, Parsed};
 use super::text::{Lines, Words, decode_text, float, integer, quote};
-use super::{IoError, matrix, write_atomically, write_vector};
+use super::{IoError, matrix, write_atomically};
 use crate::mesh::SurfacePoint;
 use crate::point_map::PointMap;
 
@@ -74,13 +74,18 @@ pub fn read_point_map(path: &Path, n_target: Option<usize>) -> Result<PointMap, 
 /// If the extension is none of [`PointMapFormat::EXTENSIONS`], the file cannot be written, or an index does not fit
 /// `.npy`'s int32.
 pub fn write_point_map(path: &Path, map: &PointMap) -> Result<(), IoError> {
+    let bytes = encode_point_map(path, map)?;
+    write_atomically(path, |w| w.write_all(&bytes))
+}
+
+/// The bytes that [`write_point_map`] writes; `path` gives the format and the name in errors.
+///
+/// # Errors
+/// As [`write_point_map`], but for those of the file.
+pub fn encode_point_map(path: &Path, map: &PointMap) -> Result<Vec<u8>, IoError> {
     match PointMapFormat::of(path)? {
-        PointMapFormat::Txt => write_atomically(path, |w| {
-            map.iter().try_for_each(|target| writeln!(w, "{}", target.map_or(-1, i64::from)))
-        }),
-        PointMapFormat::Vts => write_atomically(path, |w| {
-            map.iter().try_for_each(|target| writeln!(w, "{}", target.map_or(0, |t| i64::from(t) + 1)))
-        }),
+        PointMapFormat::Txt => Ok(lines(map.iter().map(|target| target.map_or(-1, i64::from)))),
+        PointMapFormat::Vts => Ok(lines(map.iter().map(|target| target.map_or(0, |t| i64::from(t) + 1)))),
         PointMapFormat::Npy => {
             let targets: Option<Vec<i32>> =
                 map.iter().map(|target| target.map_or(Some(-1), |t| i32::try_from(t).ok())).collect();
@@ -89,15 +94,20 @@ pub fn write_point_map(path: &Path, map: &PointMap) -> Result<(), IoError> {
                 problem: "a target index does not fit int32".into(),
                 remedy: "write a .txt file",
             })?;
-            write_vector(path, &targets)
+            Ok(matrix::encode(&[targets.len()], &targets))
         }
-        PointMapFormat::Csv => write_csv(path, map),
-        PointMapFormat::Npz => write_npz(path, map),
+        PointMapFormat::Csv => Ok(csv(map)),
+        PointMapFormat::Npz => npz(path, map),
     }
 }
 
+/// A number a line.
+fn lines(numbers: impl Iterator<Item = i64>) -> Vec<u8> {
+    numbers.flat_map(|number| format!("{number}\n").into_bytes()).collect()
+}
+
 /// `targets` int32 `[n]`, `confidence` float32 `[n]`, `faces` int32 `[n]`, `weights` float64 `[n, 3]`: what the map has of them.
-fn write_npz(path: &Path, map: &PointMap) -> Result<(), IoError> {
+fn npz(path: &Path, map: &PointMap) -> Result<Vec<u8>, IoError> {
     let index = |value: Option<u32>| value.map_or(Some(-1), |value| i32::try_from(value).ok());
     let faces =
         |points: &Vec<Option<SurfacePoint>>| points.iter().map(|p| index(p.map(|p| p.face))).collect();
@@ -118,27 +128,31 @@ fn write_npz(path: &Path, map: &PointMap) -> Result<(), IoError> {
         let weights: Vec<f64> = points.iter().flat_map(|p| p.map_or([0.0; 3], |p| p.weights)).collect();
         ("weights", matrix::encode(&[n, 3], &weights))
     }));
-    matrix::write_npz(path, &arrays)
+    matrix::npz(path, &arrays)
 }
 
-fn write_csv(path: &Path, map: &PointMap) -> Result<(), IoError> {
-    write_atomically(path, |w| {
-        writeln!(w, "# source->target, 0-based, n_source={}, n_target={}", map.len(), map.n_target)?;
-        let finer = if map.points.is_some() { ",face,u,v,w" } else { "" };
-        writeln!(w, "source,target,confidence{finer}")?;
-        for (source, target) in map.iter().enumerate() {
-            write!(w, "{source},{},", target.map_or(-1, i64::from))?;
-            if let Some(confidence) = map.confidence.as_ref().and_then(|c| c.get(source)) {
-                write!(w, "{confidence}")?;
-            }
-            match map.points.as_ref().map(|points| points.get(source).copied().flatten()) {
-                Some(Some(SurfacePoint { face, weights: [u, v, t] })) => writeln!(w, ",{face},{u},{v},{t}")?,
-                Some(None) => writeln!(w, ",-1,0,0,0")?,
-                None => writeln!(w)?,
-            }
+fn csv(map: &PointMap) -> Vec<u8> {
+    let finer = if map.points.is_some() { ",face,u,v,w" } else { "" };
+    let mut text = format!(
+        "# source->target, 0-based, n_source={}, n_target={}\nsource,target,confidence{finer}\n",
+        map.len(),
+        map.n_target
+    );
+    for (source, target) in map.iter().enumerate() {
+        text += &format!("{source},{},", target.map_or(-1, i64::from));
+        if let Some(confidence) = map.confidence.as_ref().and_then(|c| c.get(source)) {
+            text += &confidence.to_string();
         }
-        Ok(())
-    })
+        match map.points.as_ref().map(|points| points.get(source).copied().flatten()) {
+            Some(Some(SurfacePoint { face, weights: [u, v, w] })) => {
+                text += &format!(",{face},{u},{v},{w}");
+            }
+            Some(None) => text += ",-1,0,0,0",
+            None => {}
+        }
+        text.push('\n');
+    }
+    text.into_bytes()
 }
 
 pub(super) fn decode(bytes: &[u8], format: PointMapFormat, n_target: Option<usize>) -> Parsed<PointMap> {

@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// What computes the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Backend {
     /// tract, pure Rust, built in.

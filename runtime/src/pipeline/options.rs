@@ -9,7 +9,8 @@ use std::path::PathBuf;
 const REFINED_K: usize = 200;
 
 /// The pointwise descriptors that the functional map is computed from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum DescriptorKind {
     /// By the network of a model.
@@ -20,7 +21,8 @@ pub enum DescriptorKind {
 }
 
 /// What happens to the map of the working meshes before it is upscaled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Refinement {
     /// Nothing: the raw map.
@@ -35,7 +37,7 @@ pub enum Refinement {
     /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
     /// meshes of equally many vertices, injective where the source has fewer.
     #[serde(alias = "pmf-geometry")]
-    #[value(alias = "pmf-geometry")]
+    #[cfg_attr(feature = "cli", value(alias = "pmf-geometry"))]
     Pmf,
     /// The product manifold filter, then along the triangulation, where both meshes turn out to have the same, as
     /// registrations of one template do: the map then is exact, whatever the shapes.
@@ -61,7 +63,8 @@ impl Refinement {
 }
 
 /// How the map of decimated meshes becomes one of the full meshes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Upscaling {
     /// Along the surface: a vertex of the full source goes where its place on the decimated one goes. Maps that come from no
@@ -75,7 +78,8 @@ pub enum Upscaling {
 }
 
 /// How much is tried to find a good map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Effort {
     /// One way to the map.

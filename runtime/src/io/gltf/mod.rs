@@ -22,7 +22,7 @@ use std::path::Path;
 use super::attributes::MeshFile;
 use super::error::Parsed;
 
-pub(super) use write::write;
+pub(super) use write::encode;
 
 pub(super) fn read(bytes: &[u8], folder: &Path) -> Parsed<MeshFile> {
     scene::read(&document::Document::open(bytes, folder)?)

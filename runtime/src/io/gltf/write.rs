@@ -16,11 +16,11 @@ use super::color;
 use super::matrix4::{self, Matrix4};
 use super::uri::encode_percent;
 use crate::Mesh;
+use crate::io::IoError;
 use crate::io::attributes::{Attributes, Skin, Texture};
 use crate::io::carried::GlbIntegers;
 use crate::io::reference::bytes_of_path;
 use crate::io::texture::{is_jpeg, is_png};
-use crate::io::{IoError, write_atomically};
 use crate::mesh::vec3;
 use buffer::{Buffer, Numbers};
 use seams::Split;
@@ -28,7 +28,8 @@ use seams::Split;
 /// What does not fit, and what to do about it.
 type Misfit = (String, &'static str);
 
-pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
+/// The bytes of the file; `path` is for messages and for the folder of an image.
+pub(in crate::io) fn encode(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<Vec<u8>, IoError> {
     let unwritable = |(problem, remedy): Misfit| IoError::Unwritable { path: path.into(), problem, remedy };
     if mesh.n_vertices() == 0 || mesh.n_faces() == 0 {
         return Err(unwritable(("glTF has no empty meshes".into(), "write a .ply or .off file")));
@@ -66,8 +67,7 @@ pub(in crate::io) fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) ->
     let scene =
         buffer.root.push(json::Scene { extensions: None, extras: Default::default(), name: None, nodes });
     buffer.root.scene = Some(scene);
-    let bytes = buffer.into_glb().map_err(unwritable)?;
-    write_atomically(path, |w| w.write_all(&bytes))
+    buffer.into_glb().map_err(unwritable)
 }
 
 /// On each axis along which the mesh is so far from the origin that single precision would show, a place near the middle of the mesh; else
