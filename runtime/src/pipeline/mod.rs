@@ -89,6 +89,8 @@ pub struct Matcher {
     calibration: Calibration,
     shot: ShotOptions,
     network: Option<NetworkDescriptor>,
+    /// What describes shapes where there is no network.
+    plain: Box<dyn Descriptor>,
     cache: Option<Cache>,
 }
 
@@ -100,13 +102,15 @@ impl Matcher {
     /// made.
     pub fn new(options: &MatchOptions) -> Result<Self, Error> {
         let network = match (options.descriptor, &options.model) {
-            (DescriptorKind::Shot, _) => None,
-            (_, ModelSource::File(path)) => Some(DescriptorNetwork::load(path, options.backend)?),
-            (_, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
+            (DescriptorKind::Learned, ModelSource::File(path)) => {
+                Some(DescriptorNetwork::load(path, options.backend)?)
+            }
+            (DescriptorKind::Learned, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
                 Path::new("embedded model"),
                 EMBEDDED_MODEL,
                 options.backend,
             )?),
+            (DescriptorKind::Shot, _) => None,
         };
         let metadata = network.as_ref().map(DescriptorNetwork::metadata);
         let mut shot = metadata.map_or_else(ShotOptions::default, |m| m.shot);
@@ -133,6 +137,7 @@ impl Matcher {
             adapt: options.adapt,
             calibration: metadata.and_then(|m| m.calibration).unwrap_or_default(),
             shot,
+            plain: Box::new(shot),
             network: network.map(|network| NetworkDescriptor { network, shot }),
             cache: options.cache.as_deref().map(Cache::open).transpose()?,
         })
@@ -182,14 +187,14 @@ impl Matcher {
     pub fn descriptor(&self) -> &dyn Descriptor {
         match &self.network {
             Some(network) => network,
-            None => &self.shot,
+            None => &*self.plain,
         }
     }
 
     /// What tells descriptors of this matcher from those of another: its model, back-end and settings of SHOT.
     pub fn descriptor_key(&self) -> CacheKey {
-        let kind: &[u8] = if self.network.is_some() { b"network" } else { b"shot" };
-        CacheKey::of(&[kind, &self.descriptor().settings()])
+        let descriptor = self.descriptor();
+        CacheKey::of(&[descriptor.kind().as_bytes(), &descriptor.settings()])
     }
 
     /// Whether a shape, which may come from a file, has descriptors as this matcher makes them.
