@@ -25,6 +25,7 @@ pub struct GroundTruth {
 
 /// Where a [`GroundTruth`] comes from: what `--ground-truth` takes.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum GroundTruthSource {
     /// `identity`: vertex i corresponds with vertex i.
     Identity,

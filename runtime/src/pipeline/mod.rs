@@ -40,14 +40,18 @@ pub use describe_pair::Named;
 pub use described::DescribedShape;
 pub use descriptor::{Descriptor, NetworkDescriptor};
 pub use landmarks::LandmarkError;
-pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
+pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Resize, Upscaling};
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
 const SHOT_K: usize = 120;
 /// Meshes of fewer vertices than this are subdivided.
 const SPARSE: usize = 2000;
-/// The model that is built into the library.
-const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
+/// The model that is built into the library; `model.onnx` is a link to that of `models/bodies`, which packages follow.
+const EMBEDDED_MODEL: &[u8] = include_bytes!("../../model.onnx");
+const _: () = assert!(
+    EMBEDDED_MODEL.len() > 1000,
+    "runtime/model.onnx is no link here: copy models/bodies/model.onnx to it"
+);
 
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,8 +128,8 @@ impl Matcher {
         let by_default = if network.is_some() { None } else { Some(Refinement::None) };
         Ok(Self {
             shape_options: ShapeOptions {
-                decimate: options.decimate.unwrap_or(default_decimate),
-                subdivide: options.subdivide.unwrap_or((!one_to_one).then_some(SPARSE)),
+                decimate: options.decimate.or(default_decimate),
+                subdivide: options.subdivide.or((!one_to_one).then_some(SPARSE)),
                 whole_area: None,
             },
             k,
@@ -337,7 +341,7 @@ mod tests {
 
     fn matcher(k: usize) -> Matcher {
         let (descriptor, k) = (DescriptorKind::Shot, Some(k));
-        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() })
+        Matcher::new(&MatchOptions { descriptor, k, subdivide: Resize::Never, ..MatchOptions::default() })
             .unwrap()
     }
 
@@ -407,7 +411,7 @@ mod tests {
             descriptor: DescriptorKind::Shot,
             k: Some(40),
             shot_radius: Some(0.2),
-            decimate: Some(Some(900)),
+            decimate: Resize::To(900),
             solver: Some(FmapSolver::Joint { weight: 0.1 }),
             refinement: Some(Refinement::Wavelet),
             ..MatchOptions::default()

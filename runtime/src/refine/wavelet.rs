@@ -26,6 +26,7 @@ pub struct WaveletStage {
 
 /// Options of [`wavelet`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WaveletOptions {
     /// One after the other. At least one; default 5 rounds at 200 eigenfunctions.
     pub stages: Vec<WaveletStage>,
@@ -102,8 +103,8 @@ pub struct RefinedBoth<Info> {
 /// Distances are compared in single precision where the shapes are small, as [`crate::point_map::Embedding::both`] does.
 ///
 /// # Errors
-/// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map does not fit the bases or matches
-/// nothing, or an entry of a basis is not finite.
+/// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map or the anchors do not fit the
+/// bases, a map matches nothing, or an entry of a basis is not finite.
 pub fn wavelet(
     maps: [&PointMap; 2],
     basis_source: &Eigenbasis,
@@ -112,6 +113,7 @@ pub fn wavelet(
 ) -> Result<RefinedBoth<WaveletInfo>, RefineError> {
     check(options)?;
     check_bases(basis_source, basis_target)?;
+    check_anchors(options, basis_source.n(), basis_target.n())?;
     let bases = [basis_source, basis_target];
     for (map, [from, to]) in maps.into_iter().zip([bases, [basis_target, basis_source]]) {
         // Checks the whole point map, whatever the first round will use of it.
@@ -132,6 +134,16 @@ pub fn wavelet(
     let embedding = embedding(&functional_maps, &truncated, options)?;
     let [map, map_back] = embedding.both()?;
     Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds } })
+}
+
+/// Anchors have a row for each vertex, of one width.
+fn check_anchors(options: &WaveletOptions, n_source: usize, n_target: usize) -> Result<(), RefineError> {
+    let Some([source, target]) = options.anchors.as_deref() else { return Ok(()) };
+    let found = [source.rows(), source.cols(), target.rows(), target.cols()];
+    match found == [n_source, target.cols(), n_target, source.cols()] {
+        true => Ok(()),
+        false => Err(RefineError::Descriptors { found, n_source, n_target }),
+    }
 }
 
 fn embedding(
