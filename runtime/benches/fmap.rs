@@ -41,7 +41,7 @@ fn main() {
 
 /// The bases at unit area and the coefficients of the learned descriptors, `[k, 352]`.
 fn described(meshes: [Mesh; 2]) -> [(Eigenbasis, Matrix); 2] {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/bodies/model.onnx");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("model.onnx");
     let network = DescriptorNetwork::load(&model, Backend::Tract).expect("the built-in model");
     meshes.map(|mesh| {
         let (basis, _) =

@@ -25,7 +25,6 @@ pub struct GroundTruth {
 
 /// Where a [`GroundTruth`] comes from: what `--ground-truth` takes.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum GroundTruthSource {
     /// `identity`: vertex i corresponds with vertex i.
     Identity,

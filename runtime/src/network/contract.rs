@@ -36,7 +36,6 @@ const ONNX_FLOAT: i32 = 1;
 
 /// What a network can be given of a shape, at unit area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
 pub enum Quantity {
     /// SHOT descriptors, `[n, 352]`.
     Shot,
