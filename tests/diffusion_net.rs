@@ -7,7 +7,7 @@ use fmnet::Matrix;
 use fmnet::diffusion_net::{Architecture, Operators, forward};
 use fmnet::io::read_mesh;
 use fmnet::network::{Backend, DescriptorNetwork};
-use fmnet::pipeline::{MatchOptions, Matcher, ModelSource};
+use fmnet::pipeline::{MatchOptions, Matcher, ModelSource, Resize};
 use fmnet_tests::{relative_difference, research_data, skipped, test_metadata};
 use fmnet_trainer::export::export;
 use fmnet_trainer::network::{
@@ -111,8 +111,7 @@ fn its_descriptors_come_out_of_the_mesh_through_the_exported_file() {
     (metadata.k, metadata.solver) = (100, fmnet::fmap::FmapSolver::Joint { weight: 0.1 });
     export(&trained(&folder), &metadata, &model).unwrap();
     DescriptorNetwork::load(&model, Backend::Tract).unwrap();
-    let options =
-        MatchOptions { model: ModelSource::File(model), subdivide: Some(None), ..MatchOptions::default() };
+    let options = MatchOptions::default().model(ModelSource::File(model)).subdivide(Resize::Never);
     let matcher = Matcher::new(&options).unwrap();
     let mesh = read_mesh(&folder.join("tr_reg_060_1500.off")).unwrap().mesh;
     let described = matcher.describe("reference", &mesh, &fmnet::events::ignore).unwrap();

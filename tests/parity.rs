@@ -119,7 +119,9 @@ fn check_javascript(
 }
 
 fn shot_input() -> Input {
-    let shot = shot(&bumpy_sphere(4, 3), &ShotOptions { radius: 0.15, ..ShotOptions::default() }).unwrap().0;
+    let mut options = ShotOptions::default();
+    options.radius = 0.15;
+    let shot = shot(&bumpy_sphere(4, 3), &options).unwrap().0;
     Input {
         n: shot.rows(),
         arrays: vec![(Quantity::Shot, shot.data().to_vec())],

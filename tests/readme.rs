@@ -12,7 +12,7 @@ type Words = Vec<String>;
 
 /// Every page for users.
 fn pages() -> Vec<PathBuf> {
-    let mut pages: Vec<PathBuf> = [root().join("README.md"), root().join("models/README.md")].into();
+    let mut pages: Vec<PathBuf> = ["README.md", "CONTRIBUTING.md"].map(|page| root().join(page)).into();
     for folder in ["docs", "examples", "models"] {
         pages.extend(
             files_below(&root().join(folder))
@@ -128,6 +128,7 @@ fn execute(work: &Workplace, words: &Words) -> bool {
     provide_meshes(work, &rest);
     if words.iter().any(|w| w == "pairs.txt") {
         std::fs::write(work.path("pairs.txt"), "a.ply b.ply\n").unwrap();
+        provide_meshes(work, &["a.ply".into(), "b.ply".into()].into());
     }
     if words.iter().any(|w| w == "landmarks.txt") {
         std::fs::write(work.path("landmarks.txt"), "0 0\n200 200\n").unwrap();

@@ -61,6 +61,7 @@ impl Way {
             true => donors.on_surface(map, &giver),
             false => donors.interpolated(&receiver, &giver),
         };
+        let donors = donors.map_err(said)?;
         Ok(Self { giver, receiver, donors })
     }
 }
@@ -111,7 +112,7 @@ fn numbers<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let columns = array.call_method1("reshape", (array.shape()[0], -1))?;
     let values = matrix(&columns, [None, None], "values")?;
-    let moved = run(py, None, move |_| Ok(transfer_values(&values, &donors)))?;
+    let moved = run(py, None, move |_| transfer_values(&values, &donors).map_err(said))?;
     let n = moved.rows();
     let moved = out_matrix(py, moved)?;
     let moved = if array.ndim() == 1 { moved.reshape([n])?.into_any() } else { moved.into_any() };
@@ -215,7 +216,7 @@ pub(crate) fn transfer_uvs<'py>(
     let uvs: Vec<f32> = uvs.iter().map(|&x| x as f32).collect();
     let attributes = Attributes { corner_uvs: Some(uvs_of(&uvs)), ..Attributes::default() };
     let moved = run(py, None, move |_| {
-        let moved = transfer_attributes(&way.giver, &attributes, &way.receiver, &way.donors);
+        let moved = transfer_attributes(&way.giver, &attributes, &way.receiver, &way.donors).map_err(said)?;
         moved.corner_uvs.ok_or_else(|| said("no texture coordinates came of the transfer"))
     })?;
     let m = moved.len();

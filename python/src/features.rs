@@ -7,7 +7,7 @@ use crate::options::Given;
 use crate::run::run;
 use fmnet::Matrix;
 use fmnet::network::contract::{ModelInput, Quantity};
-use fmnet::pipeline::{DescribedShape, MatchOptions, Matcher};
+use fmnet::pipeline::{DescribedShape, Matcher, Resize};
 use fmnet::spectral::Eigenbasis;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -72,7 +72,7 @@ pub(crate) fn features<'py>(
         cache,
     };
     // A row for each vertex of the mesh.
-    let options = MatchOptions { subdivide: Some(None), ..given.options()? };
+    let options = given.options()?.subdivide(Resize::Never);
     let input = Input::mesh(mesh, "mesh")?;
     let found = run(py, progress, move |observer| {
         let matcher = Matcher::new(&options)?;

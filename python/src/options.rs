@@ -2,7 +2,7 @@
 
 use crate::errors::wrong;
 use fmnet::fmap::{FmapSolver, SolverKind};
-use fmnet::pipeline::{MatchOptions, ModelSource};
+use fmnet::pipeline::{MatchOptions, ModelSource, Resize};
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde::de::value::{Error as NameError, StrDeserializer};
@@ -39,22 +39,21 @@ impl Given<'_, '_> {
             return Err(wrong(format!("adapt is {steps}, expected 0 to 100")));
         }
         let fm: Option<SolverKind> = self.fm.map(|name| named("fm", name)).transpose()?;
-        Ok(MatchOptions {
-            descriptor: named("descriptor", self.descriptor)?,
-            model: self.model.map_or(ModelSource::Embedded, ModelSource::File),
-            k: self.k,
-            solver: FmapSolver::chosen(fm, weight(self.mask_weight)?),
-            refinement: self.refine.map(|name| named("refine", name)).transpose()?,
-            upscaling: named("upscale", self.upscale)?,
-            effort: named("effort", self.effort)?,
-            adapt: self.adapt,
-            backend: named("backend", self.backend)?,
-            decimate: self.decimate.as_ref().map(|n| vertices("decimate", n)).transpose()?,
-            subdivide: self.subdivide.as_ref().map(|n| vertices("subdivide", n)).transpose()?,
-            shot_radius: self.shot_radius,
-            cache: self.cache,
-            ..MatchOptions::default()
-        })
+        let mut options = MatchOptions::default();
+        options.descriptor = named("descriptor", self.descriptor)?;
+        options.model = self.model.map_or(ModelSource::Embedded, ModelSource::File);
+        options.k = self.k;
+        options.solver = FmapSolver::chosen(fm, weight(self.mask_weight)?);
+        options.refinement = self.refine.map(|name| named("refine", name)).transpose()?;
+        options.upscaling = named("upscale", self.upscale)?;
+        options.effort = named("effort", self.effort)?;
+        options.adapt = self.adapt;
+        options.backend = named("backend", self.backend)?;
+        options.decimate = resize("decimate", self.decimate.as_ref())?;
+        options.subdivide = resize("subdivide", self.subdivide.as_ref())?;
+        options.shot_radius = self.shot_radius;
+        options.cache = self.cache;
+        Ok(options)
     }
 }
 
@@ -74,11 +73,12 @@ pub(crate) fn weight(mask_weight: Option<f64>) -> PyResult<Option<f64>> {
 }
 
 /// A number of vertices, or never.
-fn vertices(option: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+fn resize(option: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Resize> {
+    let Some(value) = value else { return Ok(Resize::Default) };
     let is_off = value.extract::<String>().is_ok_and(|text| text == "off");
     match value.extract::<usize>() {
-        _ if is_off => Ok(None),
-        Ok(n) if n >= 100 => Ok(Some(n)),
+        _ if is_off => Ok(Resize::Never),
+        Ok(n) if n >= 100 => Ok(Resize::To(n)),
         _ => {
             Err(wrong(format!("{option} is {value}, expected a number of vertices, 100 or more, or \"off\"")))
         }

@@ -84,6 +84,7 @@ fn deliver(py: Python<'_>, event: Event, progress: Option<&Bound<'_, PyAny>>) ->
         Event::Warning(text) => return warn(py, &text),
         Event::Started { subject, stage } => (subject, stage, None),
         Event::Finished { subject, stage, seconds } => (subject, stage, Some(seconds)),
+        _ => return Ok(()),
     };
     match progress {
         Some(progress) => progress.call1((subject, stage, seconds)).map(drop),

@@ -82,7 +82,8 @@ pub(crate) fn shot<'py>(
     min_neighbors: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let input = Input::mesh(mesh, "mesh")?;
-    let options = ShotOptions { radius, bins, min_neighbors };
+    let mut options = ShotOptions::default();
+    (options.radius, options.bins, options.min_neighbors) = (radius, bins, min_neighbors);
     let descriptors = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
         let _reserved =
@@ -206,7 +207,9 @@ pub(crate) fn zoomout<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (source, target) = (in_basis(source_basis, "source_basis")?, in_basis(target_basis, "target_basis")?);
     let map = in_map(targets, source.n(), target.n(), "targets")?;
-    let options = ZoomOutOptions { k_start, k_step, k_max, bidirectional, ..ZoomOutOptions::default() };
+    let mut options = ZoomOutOptions::default();
+    (options.k_start, options.k_step, options.k_max) = (k_start, k_step, k_max);
+    options.bidirectional = bidirectional;
     let found = run(py, None, move |_| Ok(refine(&map, &source, &target, &options)?))?;
     let functional_map = out_matrix(py, found.functional_map)?;
     named_tuple(py, "Refined", (out_targets(py, &found.map), out_confidence(py, &found.map), functional_map))

@@ -1,4 +1,4 @@
-"""Every block of Python of the page `docs/python.md` and of the README runs, word for word."""
+"""Every block of Python of the pages and of the README runs, word for word."""
 
 import shutil
 
@@ -38,7 +38,9 @@ def workplace(demo, tmp_path, monkeypatch):
     }
 
 
-@pytest.mark.parametrize("page, fewest", [("docs/python.md", 5), ("README.md", 1), ("python/README.md", 1)])
+@pytest.mark.parametrize(
+    "page, fewest", [("docs/python.md", 5), ("docs/transfer.md", 1), ("README.md", 1), ("python/README.md", 1)]
+)
 def test_the_blocks_of_a_page_run(page, fewest, workplace):
     code = blocks(page)
     assert len(code) >= fewest

@@ -41,7 +41,7 @@ fn main() {
 
 /// The bases at unit area and the coefficients of the learned descriptors, `[k, 352]`.
 fn described(meshes: [Mesh; 2]) -> [(Eigenbasis, Matrix); 2] {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/bodies/model.onnx");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("model.onnx");
     let network = DescriptorNetwork::load(&model, Backend::Tract).expect("the built-in model");
     meshes.map(|mesh| {
         let (basis, _) =
@@ -86,12 +86,15 @@ fn refine(report: &Report, bases: [&Eigenbasis; 2], hats: [&Matrix; 2]) {
     let (cost, map) = least(report.runs(5), || recover(&c, &source, &target).expect("a map of the shapes"));
     tell(report, "point-map", cost);
     report.export("fmap", |folder| write_targets(&folder.join("point-map.npy"), &map));
-    let rounds = IcpOptions { max_iterations: 3 };
+    let mut rounds = IcpOptions::default();
+    rounds.max_iterations = 3;
     let (cost, _) =
         least(report.runs(3), || icp(&c, &source, &target, &rounds).expect("a map of the shapes"));
     tell(report, "icp-3-rounds", cost);
-    let paper = ZoomOutOptions { bidirectional: false, ..ZoomOutOptions::default() };
-    let samples = ZoomOutOptions { samples: ZoomOutSamples::Farthest(1000), ..paper.clone() };
+    let mut paper = ZoomOutOptions::default();
+    paper.bidirectional = false;
+    let mut samples = paper.clone();
+    samples.samples = ZoomOutSamples::Farthest(1000);
     for (name, options) in [
         ("zoomout", paper),
         ("zoomout-1000-samples", samples),

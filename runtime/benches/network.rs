@@ -15,7 +15,7 @@ use support::shapes::bumpy_torus;
 
 fn main() {
     let report = Report::from_arguments("network");
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/bodies/model.onnx");
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("model.onnx");
     let network = DescriptorNetwork::load(&model, Backend::Tract).expect("the built-in model");
     let mesh = bumpy_torus(106, 65);
     let n = mesh.n_vertices();

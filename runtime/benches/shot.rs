@@ -36,7 +36,8 @@ fn main() {
 }
 
 fn measure(report: &Report, name: &str, mesh: &Mesh, radius: f64) {
-    let options = ShotOptions { radius, ..Default::default() };
+    let mut options = ShotOptions::default();
+    options.radius = radius;
     let n = mesh.n_vertices();
     let runs = report.runs(if n > 20_000 { 2 } else { 7 });
     let (cost, info) = least(runs, || shot(mesh, &options).expect("a mesh with an area").1);

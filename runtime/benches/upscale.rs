@@ -74,7 +74,8 @@ fn measure(report: &Report, source: &Mesh, target: &Mesh, n_work: usize) {
     let [work_source, work_target] = [source, target].map(|mesh| timed(report, "decimate", || reduce(mesh)));
     let [basis_source, basis_target] =
         [source, target].map(|mesh| timed(report, "full eigenbasis", || basis_of(mesh)));
-    let options = GeodesicOptions { n_neighbors: 40, ..GeodesicOptions::default() };
+    let mut options = GeodesicOptions::default();
+    options.n_neighbors = 40;
     let solver = timed(report, "geodesic solver", || GeodesicSolver::new(target, &options));
     let error = |pairs: &[(u32, u32)]| {
         let step = pairs.len().div_ceil(SAMPLES);

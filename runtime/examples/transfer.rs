@@ -36,8 +36,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Each body faces another way; they are turned toward the viewer.
     let mut pictures = vec![pictured(&giver, &attributes, &image, PI + 0.3)];
     let found = match_meshes(&receiver, &giver, &MatchOptions::default())?;
-    let donors = Donors::of_source(&found.map).interpolated(&receiver, &giver);
-    let moved = transfer_attributes(&giver, &attributes, &receiver, &donors);
+    let donors = Donors::of_source(&found.map).interpolated(&receiver, &giver)?;
+    let moved = transfer_attributes(&giver, &attributes, &receiver, &donors)?;
     write_mesh(&folder.join("receiver.glb"), &receiver, &moved)?;
     pictures.push(pictured(&receiver, &moved, &image, 0.6 - FRAC_PI_2));
     write_atomically(&folder.join("transfer.png"), |file| file.write_all(&side_by_side(&pictures).to_png()))?;

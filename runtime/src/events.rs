@@ -4,6 +4,7 @@ use std::time::Instant;
 
 /// One thing that happened.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Event {
     /// A stage begins.
     Started {

@@ -16,12 +16,7 @@
 //!
 //! let source = bumpy_sphere(3, 1);
 //! let (target, _) = permuted(&source, 7);
-//! let options = MatchOptions {
-//!     descriptor: DescriptorKind::Shot,
-//!     k: Some(40),
-//!     shot_radius: Some(0.2),
-//!     ..MatchOptions::default()
-//! };
+//! let options = MatchOptions::default().descriptor(DescriptorKind::Shot).k(40).shot_radius(0.2);
 //! let result = match_meshes(&source, &target, &options)?;
 //!
 //! assert_eq!(result.map.len(), source.n_vertices());
@@ -62,7 +57,9 @@
 //!   descriptors in f32. Vertices count from 0.
 //! - Lengths in options are relative to sqrt(area): results change neither with the unit nor with the position of a mesh.
 //! - The same input gives the same bytes, whatever the number of threads. Nothing here prints or panics on input; errors name the
-//!   element and the remedy.
+//!   element and the remedy. Where an index or a size is the caller's own, as with slices, the page says under *Panics* what must hold.
+//! - Options are public fields on top of `Default`; [`MatchOptions`](pipeline::MatchOptions) has a function for each besides. New ones may
+//!   come with any version, and so may variants of choices.
 //!
 //! # Features
 //!

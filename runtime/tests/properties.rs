@@ -55,9 +55,9 @@ fn all_donors<'a>(source: &'a Mesh, target: &'a Mesh, map: &PointMap) -> Vec<(&'
     let (to_source, to_target) =
         (Donors::of_source(map), Donors::of_target(map, target).expect("the map is of the target"));
     vec![
-        (target, source, to_source.clone().interpolated(source, target)),
+        (target, source, to_source.clone().interpolated(source, target).unwrap()),
         (target, source, to_source),
-        (source, target, to_target.clone().interpolated(target, source)),
+        (source, target, to_target.clone().interpolated(target, source).unwrap()),
         (source, target, to_target),
     ]
 }
@@ -133,8 +133,8 @@ proptest! {
                     weights: vec![[0.5, 0.25, 0.25, 0.0]; n],
                 }),
             };
-            let moved = transfer_attributes(giver, &attributes, receiver, &donors);
-            let values = transfer_values(&Matrix::from_fn(n, 1, |_, _| 7.0), &donors);
+            let moved = transfer_attributes(giver, &attributes, receiver, &donors).unwrap();
+            let values = transfer_values(&Matrix::from_fn(n, 1, |_, _| 7.0), &donors).unwrap();
             let (colors, skin) = (moved.vertex_colors.unwrap(), moved.skin.unwrap());
             for (v, donor) in donors.iter().enumerate() {
                 let weights: f32 = skin.weights[v].iter().sum();
@@ -162,7 +162,7 @@ proptest! {
     fn values_stay_within_the_range_of_the_giver((source, target, map) in mapped()) {
         for (giver, _, donors) in all_donors(&source, &target, &map) {
             let values = Matrix::from_fn(giver.n_vertices(), 3, |i, j| giver.vertices()[i][j]);
-            let moved = transfer_values(&values, &donors);
+            let moved = transfer_values(&values, &donors).unwrap();
             for j in 0..3 {
                 let column = || giver.vertices().iter().map(|p| p[j]);
                 let (low, high) = (column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max));
@@ -176,7 +176,7 @@ proptest! {
     fn landmarks_of_a_permutation_are_found(mesh in surface(), seed: u64, marks in vec(0..16u32, 1..5)) {
         let (copy, new_of_old) = permuted(&mesh, seed);
         let map = PointMap::new(new_of_old, copy.n_vertices());
-        let moved = transfer_landmarks(&marks, &copy, &mesh, &Donors::of_source(&map));
+        let moved = transfer_landmarks(&marks, &copy, &mesh, &Donors::of_source(&map)).unwrap();
         for (&mark, found) in marks.iter().zip(moved) {
             let found = found.unwrap();
             prop_assert_eq!(mesh.vertices()[found as usize], copy.vertices()[mark as usize]);

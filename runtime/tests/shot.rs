@@ -17,7 +17,19 @@ fn descriptors(mesh: &Mesh) -> Matrix<f32> {
 
 /// A radius that holds about a hundred vertices of the test shapes.
 fn options() -> ShotOptions {
-    ShotOptions { radius: 0.12, ..Default::default() }
+    of_radius(0.12)
+}
+
+fn of_radius(radius: f64) -> ShotOptions {
+    let mut options = ShotOptions::default();
+    options.radius = radius;
+    options
+}
+
+fn of_bins(bins: usize) -> ShotOptions {
+    let mut options = of_radius(0.4);
+    options.bins = bins;
+    options
 }
 
 fn cosine(a: &[f32], b: &[f32]) -> f64 {
@@ -89,7 +101,7 @@ fn a_mirrored_shape_has_other_descriptors() {
 fn rows_of_any_mesh_have_unit_norm_or_are_zero() {
     for (name, mesh) in shapes::zoo() {
         for radius in [1e-3, 0.067, 0.5, 10.0] {
-            let (rows, info) = shot(&mesh, &ShotOptions { radius, ..Default::default() }).unwrap();
+            let (rows, info) = shot(&mesh, &of_radius(radius)).unwrap();
             let norm = |i| cosine(rows.row(i), rows.row(i)).sqrt();
             let zeros = (0..rows.rows()).filter(|&i| norm(i) == 0.0).count();
             assert!(
@@ -117,10 +129,10 @@ fn unreferenced_vertices_are_zero_and_change_nothing() {
 #[test]
 fn too_few_neighbors_give_zero_rows() {
     let octahedron = shapes::icosphere(0);
-    let (rows, info) = shot(&octahedron, &ShotOptions { radius: 1e-3, ..Default::default() }).unwrap();
+    let (rows, info) = shot(&octahedron, &of_radius(1e-3)).unwrap();
     assert!(rows.data().iter().all(|&x| x == 0.0));
     assert_eq!((info.zero_rows, info.max_neighbors), (octahedron.n_vertices(), 0));
-    let (_, info) = shot(&octahedron, &ShotOptions { radius: 10.0, ..Default::default() }).unwrap();
+    let (_, info) = shot(&octahedron, &of_radius(10.0)).unwrap();
     assert_eq!((info.zero_rows, info.mean_neighbors), (0, octahedron.n_vertices() as f64 - 1.0));
 }
 
@@ -128,7 +140,7 @@ fn too_few_neighbors_give_zero_rows() {
 fn bins_set_the_width() {
     let mesh = shapes::bumpy_sphere(2, 1);
     for bins in [1, 2, 10, 100] {
-        let options = ShotOptions { bins, radius: 0.4, ..Default::default() };
+        let options = of_bins(bins);
         let (rows, info) = shot(&mesh, &options).unwrap();
         assert_eq!((rows.rows(), rows.cols(), info.zero_rows), (mesh.n_vertices(), options.width(), 0));
     }
@@ -153,12 +165,14 @@ fn bad_options_and_meshes_without_area_are_errors() {
     let mesh = shapes::icosphere(1);
     let error = |options| shot(&mesh, &options).unwrap_err();
     for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(error(ShotOptions { radius, ..Default::default() }), ShotError::Radius { .. }));
+        assert!(matches!(error(of_radius(radius)), ShotError::Radius { .. }));
     }
     for bins in [0, 101] {
-        assert_eq!(error(ShotOptions { bins, ..Default::default() }), ShotError::Bins { bins });
+        assert_eq!(error(of_bins(bins)), ShotError::Bins { bins });
     }
-    assert_eq!(error(ShotOptions { min_neighbors: 0, ..Default::default() }), ShotError::MinNeighbors);
+    let mut no_neighbors = ShotOptions::default();
+    no_neighbors.min_neighbors = 0;
+    assert_eq!(error(no_neighbors), ShotError::MinNeighbors);
     let points = Mesh::new(vec![[0.0; 3]; 4], vec![[0, 1, 2]]).unwrap();
     for mesh in [points, Mesh::default()] {
         assert_eq!(shot(&mesh, &ShotOptions::default()).unwrap_err(), ShotError::Area { area: 0.0 });
@@ -172,7 +186,7 @@ fn bad_options_and_meshes_without_area_are_errors() {
 fn agrees_with_the_authors_implementation() {
     for name in ["faust_tr_reg_060", "faust_5k_tr_reg_060", "scan_7k_000"] {
         let Some((mesh, vertices, reference)) = reference_rows(name) else { continue };
-        let options = ShotOptions { radius: reference_radius(name), ..Default::default() };
+        let options = of_radius(reference_radius(name));
         let (rows, info) = shot(&mesh, &options).unwrap();
         let map = vertices.iter().map(|&v| v as usize);
         let share = agreement(&reference, &rows, map.clone(), 0.99);
@@ -192,7 +206,7 @@ const GOLDEN: [usize; 6] = [0, 1, 40, 200, 333, 641];
 #[test]
 fn values_of_a_small_mesh_are_the_ones_they_were() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/shot_bumpy_sphere.npy");
-    let options = ShotOptions { radius: 0.3, ..ShotOptions::default() };
+    let options = of_radius(0.3);
     let (all, info) = shot(&shapes::bumpy_sphere(3, 1), &options).unwrap();
     assert_eq!(info.zero_rows, 0);
     let found = Matrix::from_fn(GOLDEN.len(), all.cols(), |i, j| all[(GOLDEN[i], j)]);

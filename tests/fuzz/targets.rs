@@ -14,7 +14,7 @@ use fmnet::mesh::shapes::{bumpy_sphere, grid, joined};
 use fmnet::mesh::{SurfacePoint, inspect};
 use fmnet::network::contract::ModelInput;
 use fmnet::network::{Backend, DescriptorNetwork};
-use fmnet::pipeline::{DescribedShape, DescriptorKind, MatchOptions, Matcher};
+use fmnet::pipeline::{DescribedShape, DescriptorKind, MatchOptions, Matcher, Resize};
 use fmnet::point_map::PointMap;
 use fmnet::shape::{Context, Shape, ShapeOptions};
 use fmnet::{Matrix, Mesh};
@@ -292,8 +292,10 @@ fn shapes(folder: &Path) -> Target {
         write_mesh(&path, &mesh, &Attributes::default()).unwrap();
         std::fs::read(&path).unwrap()
     });
-    let options = ShapeOptions { decimate: Some(60), subdivide: Some(50), ..ShapeOptions::default() };
-    let shot = ShotOptions { radius: 0.3, ..Default::default() };
+    let mut options = ShapeOptions::default();
+    (options.decimate, options.subdivide) = (Some(60), Some(50));
+    let mut shot = ShotOptions::default();
+    shot.radius = 0.3;
     let target = Target::new(seeds.collect(), move |bytes| {
         let Ok(file) = decode_mesh(bytes, Path::new("a.off")) else { return false };
         inspect(&file.mesh);
@@ -330,13 +332,11 @@ fn landmarks(folder: &Path) -> Target {
 }
 
 fn described() -> Target {
-    let options = MatchOptions {
-        descriptor: DescriptorKind::Shot,
-        k: Some(5),
-        shot_radius: Some(0.3),
-        subdivide: Some(None),
-        ..MatchOptions::default()
-    };
+    let options = MatchOptions::default()
+        .descriptor(DescriptorKind::Shot)
+        .k(5)
+        .shot_radius(0.3)
+        .subdivide(Resize::Never);
     let matcher = Matcher::new(&options).unwrap();
     let shape = matcher.describe("fuzz", &bumpy_sphere(1, 1), &ignore).unwrap();
     Target::new(vec![shape.encode()], |bytes| DescribedShape::decode(bytes, Path::new("a.fms")).is_ok())

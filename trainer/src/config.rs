@@ -341,12 +341,16 @@ impl TrainConfig {
 
     /// How shapes are processed.
     pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { decimate: Some(self.decimate).filter(|&n| n > 0), ..ShapeOptions::default() }
+        let mut options = ShapeOptions::default();
+        options.decimate = Some(self.decimate).filter(|&n| n > 0);
+        options
     }
 
     /// How SHOT is computed.
     pub fn shot_options(&self) -> ShotOptions {
-        ShotOptions { radius: self.shot_radius, ..ShotOptions::default() }
+        let mut options = ShotOptions::default();
+        options.radius = self.shot_radius;
+        options
     }
 
     /// Eigenpairs that network and functional map need of each shape.

@@ -154,7 +154,8 @@ pub fn process(
     context: Context,
 ) -> Result<ProcessedShape, PrepareError> {
     let mesh = entry.read()?;
-    let options = ShapeOptions { whole_area: entry.whole_area()?, ..options.clone() };
+    let mut options = options.clone();
+    options.whole_area = entry.whole_area()?;
     let shape = Shape::new(&entry.name, &mesh, &options, context)?;
     let (points, places) = match &entry.correspondence {
         Correspondence::Surface(_) => {

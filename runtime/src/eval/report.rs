@@ -6,6 +6,7 @@ use super::chart::escape;
 
 /// One piece of a section.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Block {
     /// A paragraph of plain text.
     Text(String),

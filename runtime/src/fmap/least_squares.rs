@@ -7,6 +7,7 @@ use crate::Matrix;
 
 /// Options of [`least_squares`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LeastSquaresOptions {
     /// Singular values of `F^` below this share of the largest count as zero. Range 0 to 1, default 1e-6:
     /// descriptors are single precision, so what lies near their rounding says nothing about the shape.

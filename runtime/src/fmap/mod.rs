@@ -37,6 +37,7 @@ pub(crate) use dense::{multiply, solve_positive_definite, thin_svd};
 /// How a functional map is computed from descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum FmapSolver {
     /// The paper's: all coefficients by least squares, [`least_squares`].
     LeastSquares,
@@ -115,6 +116,7 @@ impl Default for FmapSolver {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SolverKind {
     /// The paper's: all coefficients by least squares.
     LeastSquares,

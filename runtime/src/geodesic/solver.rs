@@ -12,6 +12,7 @@ use crate::{Matrix, Mesh};
 
 /// How finely a [`GeodesicSolver`] works.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct GeodesicOptions {
     /// Each vertex is joined by exact straight lines to about this many nearest vertices. Twice as many take twice
     /// the time and leave a third of the error. From 8; default 150.

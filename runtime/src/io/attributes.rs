@@ -81,6 +81,7 @@ pub struct IntegerField {
 /// A type of integers in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the names say it")]
+#[non_exhaustive]
 pub enum IntegerKind {
     I8,
     U8,
@@ -121,6 +122,7 @@ impl IntegerKind {
 
 /// A colour image.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Texture {
     /// A file. One that does not exist is not referred to by any writer.
     File(PathBuf),
@@ -158,7 +160,7 @@ pub struct Joint {
 
 impl Attributes {
     /// Whether every attribute has the mesh's size; if not, what is wrong and what to do.
-    pub(super) fn check(&self, mesh: &Mesh) -> Result<(), (String, &'static str)> {
+    pub(crate) fn check(&self, mesh: &Mesh) -> Result<(), (String, &'static str)> {
         let (n, m) = (mesh.n_vertices(), mesh.n_faces());
         self.sizes(n, m).find(|&(_, found, expected)| found != expected).map_or(
             Ok(()),

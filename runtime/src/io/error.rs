@@ -61,6 +61,7 @@ pub enum IoError {
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Position {
     /// A line of a text file, 1-based.
     Line(usize),

@@ -7,6 +7,7 @@ use super::text::decode_text;
 
 /// A mesh format that can be read; all but [`MeshFormat::Gltf`] and [`MeshFormat::Stl`] can be written too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum MeshFormat {
     /// Object File Format, `.off`.
     Off,

@@ -18,6 +18,7 @@ use crate::point_map::PointMap;
 
 /// A format of point map files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PointMapFormat {
     /// `.txt`
     Txt,

@@ -14,7 +14,8 @@ mod tract;
 
 use crate::Matrix;
 use contract::{Contract, ModelInput, ModelMetadata};
-pub use native::{NativeInput, NativeNetwork};
+pub(crate) use native::NativeInput;
+pub use native::NativeNetwork;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -24,6 +25,7 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Backend {
     /// tract, pure Rust, built in.
     #[default]
@@ -82,6 +84,16 @@ pub enum NetworkError {
         backend: Backend,
         /// Its reason.
         reason: String,
+    },
+    /// There is not an array for each input.
+    #[error(
+        "the network has {expected} inputs, but {found} arrays were given; give one for each input of its contract"
+    )]
+    InputCount {
+        /// Arrays given.
+        found: usize,
+        /// Inputs of the model.
+        expected: usize,
     },
     /// An input has another size.
     #[error(
@@ -200,12 +212,12 @@ impl DescriptorNetwork {
     /// [`Contract::inputs`].
     ///
     /// # Errors
-    /// If an input has another size, or the back-end fails.
-    ///
-    /// # Panics
-    /// If there are not as many arrays as the model has inputs.
+    /// If an input is missing or has another size, or the back-end fails.
     pub fn descriptors(&self, n: usize, inputs: &[&[f32]]) -> Result<Matrix<f32>, NetworkError> {
-        assert_eq!(inputs.len(), self.contract.inputs.len(), "an array for each input");
+        let (found, expected) = (inputs.len(), self.contract.inputs.len());
+        if found != expected {
+            return Err(NetworkError::InputCount { found, expected });
+        }
         for (input, array) in self.contract.inputs.iter().zip(inputs) {
             let expected = input.dims(n).iter().product();
             if array.len() != expected {

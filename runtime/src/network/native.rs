@@ -35,11 +35,11 @@ pub struct NativeNetwork {
 
 /// A shape as the network takes it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NativeInput {
+pub(crate) struct NativeInput {
     /// Input functions, `[n, inputs]` row-major: the wave kernel signature, then SHOT.
-    pub features: Vec<f32>,
+    pub(crate) features: Vec<f32>,
     /// Operators at unit area.
-    pub operators: Operators<f32>,
+    pub(crate) operators: Operators<f32>,
 }
 
 impl NativeNetwork {
@@ -98,7 +98,7 @@ impl NativeNetwork {
     ///
     /// # Panics
     /// If the arrays are not those of the model's inputs.
-    pub fn input(&self, n: usize, arrays: &[&[f32]]) -> NativeInput {
+    pub(crate) fn input(&self, n: usize, arrays: &[&[f32]]) -> NativeInput {
         let of = |wanted: Quantity| {
             let found = self.inputs.iter().position(|(quantity, _)| *quantity == wanted);
             found.map(|i| (arrays[i], self.inputs[i].1))

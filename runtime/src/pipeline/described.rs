@@ -94,13 +94,13 @@ mod tests {
     use super::*;
     use crate::events::ignore;
     use crate::mesh::shapes::{bumpy_sphere, permuted};
-    use crate::pipeline::{DescriptorKind, MatchOptions, Matcher};
+    use crate::pipeline::{DescriptorKind, MatchOptions, Matcher, Resize};
 
     fn matcher(shot_radius: f64) -> Matcher {
         let options = MatchOptions {
             descriptor: DescriptorKind::Shot,
             k: Some(20),
-            decimate: Some(Some(300)),
+            decimate: Resize::To(300),
             shot_radius: Some(shot_radius),
             ..MatchOptions::default()
         };

@@ -11,7 +11,10 @@ use crate::network::contract::{ModelInput, Quantity};
 use crate::shape::{Context, Shape};
 
 /// Pointwise descriptors of a shape.
-pub trait Descriptor: Send + Sync {
+pub trait Descriptor: std::fmt::Debug + Send + Sync {
+    /// The kind, by which results of different kinds are told apart.
+    fn kind(&self) -> &'static str;
+
     /// Eigenpairs that it needs of a shape, 0 where none.
     fn eigenpairs(&self) -> usize;
 
@@ -28,6 +31,10 @@ pub trait Descriptor: Send + Sync {
 
 /// SHOT itself: the paper's baseline.
 impl Descriptor for ShotOptions {
+    fn kind(&self) -> &'static str {
+        "shot"
+    }
+
     fn eigenpairs(&self) -> usize {
         0
     }
@@ -54,6 +61,10 @@ pub struct NetworkDescriptor {
 const INPUTS_VERSION: u32 = 1;
 
 impl Descriptor for NetworkDescriptor {
+    fn kind(&self) -> &'static str {
+        "network"
+    }
+
     fn eigenpairs(&self) -> usize {
         self.network.contract().eigenpairs()
     }

@@ -40,14 +40,18 @@ pub use describe_pair::Named;
 pub use described::DescribedShape;
 pub use descriptor::{Descriptor, NetworkDescriptor};
 pub use landmarks::LandmarkError;
-pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
+pub use options::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Resize, Upscaling};
 
 /// Eigenfunctions of the functional map of SHOT descriptors, as in the paper.
 const SHOT_K: usize = 120;
 /// Meshes of fewer vertices than this are subdivided.
 const SPARSE: usize = 2000;
-/// The model that is built into the library.
-const EMBEDDED_MODEL: &[u8] = include_bytes!("../../../models/bodies/model.onnx");
+/// The model that is built into the library; `model.onnx` is a link to that of `models/bodies`, which packages follow.
+const EMBEDDED_MODEL: &[u8] = include_bytes!("../../model.onnx");
+const _: () = assert!(
+    EMBEDDED_MODEL.len() > 1000,
+    "runtime/model.onnx is no link here: copy models/bodies/model.onnx to it"
+);
 
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +93,8 @@ pub struct Matcher {
     calibration: Calibration,
     shot: ShotOptions,
     network: Option<NetworkDescriptor>,
+    /// What describes shapes where there is no network.
+    plain: Box<dyn Descriptor>,
     cache: Option<Cache>,
 }
 
@@ -100,13 +106,15 @@ impl Matcher {
     /// made.
     pub fn new(options: &MatchOptions) -> Result<Self, Error> {
         let network = match (options.descriptor, &options.model) {
-            (DescriptorKind::Shot, _) => None,
-            (_, ModelSource::File(path)) => Some(DescriptorNetwork::load(path, options.backend)?),
-            (_, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
+            (DescriptorKind::Learned, ModelSource::File(path)) => {
+                Some(DescriptorNetwork::load(path, options.backend)?)
+            }
+            (DescriptorKind::Learned, ModelSource::Embedded) => Some(DescriptorNetwork::from_bytes(
                 Path::new("embedded model"),
                 EMBEDDED_MODEL,
                 options.backend,
             )?),
+            (DescriptorKind::Shot, _) => None,
         };
         let metadata = network.as_ref().map(DescriptorNetwork::metadata);
         let mut shot = metadata.map_or_else(ShotOptions::default, |m| m.shot);
@@ -120,8 +128,8 @@ impl Matcher {
         let by_default = if network.is_some() { None } else { Some(Refinement::None) };
         Ok(Self {
             shape_options: ShapeOptions {
-                decimate: options.decimate.unwrap_or(default_decimate),
-                subdivide: options.subdivide.unwrap_or((!one_to_one).then_some(SPARSE)),
+                decimate: options.decimate.or(default_decimate),
+                subdivide: options.subdivide.or((!one_to_one).then_some(SPARSE)),
                 whole_area: None,
             },
             k,
@@ -133,6 +141,7 @@ impl Matcher {
             adapt: options.adapt,
             calibration: metadata.and_then(|m| m.calibration).unwrap_or_default(),
             shot,
+            plain: Box::new(shot),
             network: network.map(|network| NetworkDescriptor { network, shot }),
             cache: options.cache.as_deref().map(Cache::open).transpose()?,
         })
@@ -182,14 +191,14 @@ impl Matcher {
     pub fn descriptor(&self) -> &dyn Descriptor {
         match &self.network {
             Some(network) => network,
-            None => &self.shot,
+            None => &*self.plain,
         }
     }
 
     /// What tells descriptors of this matcher from those of another: its model, back-end and settings of SHOT.
     pub fn descriptor_key(&self) -> CacheKey {
-        let kind: &[u8] = if self.network.is_some() { b"network" } else { b"shot" };
-        CacheKey::of(&[kind, &self.descriptor().settings()])
+        let descriptor = self.descriptor();
+        CacheKey::of(&[descriptor.kind().as_bytes(), &descriptor.settings()])
     }
 
     /// Whether a shape, which may come from a file, has descriptors as this matcher makes them.
@@ -332,7 +341,7 @@ mod tests {
 
     fn matcher(k: usize) -> Matcher {
         let (descriptor, k) = (DescriptorKind::Shot, Some(k));
-        Matcher::new(&MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() })
+        Matcher::new(&MatchOptions { descriptor, k, subdivide: Resize::Never, ..MatchOptions::default() })
             .unwrap()
     }
 
@@ -405,7 +414,7 @@ mod tests {
             descriptor: DescriptorKind::Shot,
             k: Some(40),
             shot_radius: Some(0.2),
-            decimate: Some(Some(900)),
+            decimate: Resize::To(900),
             solver: Some(FmapSolver::Joint { weight: 0.1 }),
             refinement: Some(Refinement::Wavelet),
             ..MatchOptions::default()

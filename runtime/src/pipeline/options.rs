@@ -12,6 +12,7 @@ const REFINED_K: usize = 200;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum DescriptorKind {
     /// By the network of a model.
     #[default]
@@ -24,6 +25,7 @@ pub enum DescriptorKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Refinement {
     /// Nothing: the raw map.
     None,
@@ -66,6 +68,7 @@ impl Refinement {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Upscaling {
     /// Along the surface: a vertex of the full source goes where its place on the decimated one goes. Maps that come from no
     /// functional map, those of the product manifold filter, take the l2,1 problem instead.
@@ -93,6 +96,7 @@ pub enum Effort {
 
 /// Which model computes the descriptors.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ModelSource {
     /// The model built into the library.
     #[default]
@@ -101,8 +105,39 @@ pub enum ModelSource {
     File(PathBuf),
 }
 
+/// The number of vertices that a mesh is brought to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resize {
+    /// What suits the model.
+    #[default]
+    Default,
+    /// The mesh stays as it is.
+    Never,
+    /// So many.
+    To(usize),
+}
+
+impl Resize {
+    /// The number, with the default filled in; `None`: never.
+    pub(super) fn or(self, default: Option<usize>) -> Option<usize> {
+        match self {
+            Self::Default => default,
+            Self::Never => None,
+            Self::To(n) => Some(n),
+        }
+    }
+}
+
 /// Settings of a [`Matcher`](super::Matcher). What is `None` comes from the model, or without one from the paper.
+///
+/// ```
+/// use fmnet::pipeline::{DescriptorKind, MatchOptions, Resize};
+///
+/// let options = MatchOptions::default().descriptor(DescriptorKind::Shot).k(40).decimate(Resize::To(5000));
+/// assert_eq!((options.k, options.shot_radius), (Some(40), None));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct MatchOptions {
     /// Learned descriptors, which are the default, or SHOT.
     pub descriptor: DescriptorKind,
@@ -118,12 +153,11 @@ pub struct MatchOptions {
     pub solver: Option<FmapSolver>,
     /// SHOT radius relative to sqrt(area), above 0. Default: the model's; that of [`crate::descriptor::ShotOptions`] for SHOT.
     pub shot_radius: Option<f64>,
-    /// Meshes of more vertices are decimated to so many, 4 or more; `Some(None)`: never. Default: the model's; 15000 for
-    /// SHOT.
-    pub decimate: Option<Option<usize>>,
-    /// Meshes of fewer vertices are subdivided to so many; `Some(None)`: never. Default: 2000; never
-    /// where the refinement is the product manifold filter, whose map is one of the vertices that there are.
-    pub subdivide: Option<Option<usize>>,
+    /// Meshes of more vertices are decimated to so many, 4 or more. Default: the model's; 15000 for SHOT.
+    pub decimate: Resize,
+    /// Meshes of fewer vertices are subdivided to so many. Default: 2000; never where the refinement is the product manifold
+    /// filter, whose map is one of the vertices that there are.
+    pub subdivide: Resize,
     /// Refinement. Default: what suits the solver, [`Refinement::suiting`]; none for SHOT.
     pub refinement: Option<Refinement>,
     /// Upscaling of the map of decimated meshes. Default: along the surface.
@@ -135,4 +169,36 @@ pub struct MatchOptions {
     pub adapt: Option<usize>,
     /// Folder of results kept for each shape; `None`, the default: nothing is kept.
     pub cache: Option<PathBuf>,
+}
+
+/// For each option a function of its name, which sets it and gives the options back.
+macro_rules! setters {
+    ($($name:ident: $kind:ty),* $(,)?) => {
+        impl MatchOptions {
+            $(
+                #[doc = concat!("Sets [`", stringify!($name), "`](field@MatchOptions::", stringify!($name), ").")]
+                #[must_use]
+                pub fn $name(mut self, $name: impl Into<$kind>) -> Self {
+                    self.$name = $name.into();
+                    self
+                }
+            )*
+        }
+    };
+}
+
+setters! {
+    descriptor: DescriptorKind,
+    model: ModelSource,
+    backend: Backend,
+    k: Option<usize>,
+    solver: Option<FmapSolver>,
+    shot_radius: Option<f64>,
+    decimate: Resize,
+    subdivide: Resize,
+    refinement: Option<Refinement>,
+    upscaling: Upscaling,
+    effort: Effort,
+    adapt: Option<usize>,
+    cache: Option<PathBuf>,
 }

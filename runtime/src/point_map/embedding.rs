@@ -83,7 +83,7 @@ impl Embedding {
     ///
     /// # Panics
     /// If they have not as many rows.
-    pub fn with_columns(&self, source: &Matrix, target: &Matrix) -> Self {
+    pub(crate) fn with_columns(&self, source: &Matrix, target: &Matrix) -> Self {
         let factors =
             self.factors.as_ref().map(|[left, right]| [beside(left, source), beside(right, target)]);
         Self { source: beside(&self.source, source), target: beside(&self.target, target), factors }

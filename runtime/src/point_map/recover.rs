@@ -13,6 +13,7 @@ const CHUNK: usize = 1024;
 
 /// How a point of the source is compared with one of the target, given a functional map `C`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Comparison {
     /// The distance `|C phi(x) - psi(y)|` on the target (Ovsjanikov et al. 2012), as in the paper.
     #[default]

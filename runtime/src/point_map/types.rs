@@ -35,12 +35,9 @@ impl PointMap {
         self.targets.is_empty()
     }
 
-    /// The target vertex of source vertex `source`, if it has one.
-    ///
-    /// # Panics
-    /// If there is no such source vertex.
+    /// The target vertex of source vertex `source`, if there is such a vertex and it has one.
     pub fn get(&self, source: usize) -> Option<u32> {
-        Some(self.targets[source]).filter(|&target| target != Self::UNMATCHED)
+        self.targets.get(source).copied().filter(|&target| target != Self::UNMATCHED)
     }
 
     /// The target of each source vertex in turn, `None` where it has none.
@@ -57,7 +54,7 @@ mod tests {
     fn unmatched_vertices_have_no_target() {
         let map = PointMap::new(vec![1, PointMap::UNMATCHED], 2);
         assert_eq!((map.len(), map.is_empty()), (2, false));
-        assert_eq!((map.get(0), map.get(1)), (Some(1), None));
+        assert_eq!((map.get(0), map.get(1), map.get(2)), (Some(1), None, None));
         assert_eq!(map.iter().collect::<Vec<_>>(), [Some(1), None]);
     }
 }

@@ -12,6 +12,9 @@ const FAR: f64 = 0.2;
 
 /// The doubt of every vertex of the source, `[n]`, from 0 to 1: from the share of reversed triangles and torn edges around it, and
 /// from how far it comes back from itself, averaged over its surroundings. Vertices without a match have doubt 1.
+///
+/// # Panics
+/// If a map is not one of these shapes, which [`Quality::measure`](super::Quality::measure) finds out.
 pub fn doubt(map: &PointMap, back: Option<&PointMap>, source: Side, target: Side) -> Vec<f32> {
     let reversed = averaged(&reversed_share(map, source, target), source);
     let torn = averaged(&torn_share(map, source, target), source);

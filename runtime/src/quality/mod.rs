@@ -10,7 +10,7 @@ mod estimate;
 mod spectral;
 mod surface;
 
-use crate::fmap::FmapError;
+use crate::fmap::{FmapError, functional_map_of};
 use crate::mesh::Mesh;
 use crate::point_map::PointMap;
 use crate::spectral::{Eigenbasis, Laplacian};
@@ -69,6 +69,10 @@ impl Quality {
         source: Side,
         target: Side,
     ) -> Result<Self, FmapError> {
+        if let Some(back) = back {
+            // Checks the whole map.
+            functional_map_of(back, &target.basis.truncated(1), &source.basis.truncated(1))?;
+        }
         let spectral = spectral::measure(map, source.basis, target.basis)?;
         let surface = surface::measure(map, source, target);
         Ok(Self {

@@ -9,6 +9,7 @@ use crate::spectral::Eigenbasis;
 
 /// Options of [`icp`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct IcpOptions {
     /// Rounds at most. Range 1 and up, default 10; it stops sooner once no match changes.
     pub max_iterations: usize,

@@ -30,6 +30,7 @@ pub struct WaveletStage {
 
 /// Options of [`wavelet`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WaveletOptions {
     /// One after the other. At least one; default 3 rounds at 60 eigenfunctions, 2 at 128, 3 at 200.
     pub stages: Vec<WaveletStage>,

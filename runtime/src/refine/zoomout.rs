@@ -13,6 +13,7 @@ use crate::spectral::Eigenbasis;
 
 /// Options of [`zoomout`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ZoomOutOptions {
     /// Eigenfunctions in the first round. Range 1 and up, default 60; what the initial map gets right.
     pub k_start: usize,
@@ -47,6 +48,7 @@ impl Default for ZoomOutOptions {
 
 /// Which vertices take part in the rounds before the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ZoomOutSamples {
     /// All of both shapes.
     All,

@@ -32,6 +32,43 @@ pub enum RenderError {
         /// Vertices of the mesh.
         n_target: usize,
     },
+    /// Donors are not of this receiving mesh.
+    #[error("{found} vertices receive, but the receiving mesh has {n_receiver}; pass the meshes of the map")]
+    Receiver {
+        /// Vertices that receive.
+        found: usize,
+        /// Vertices of the mesh.
+        n_receiver: usize,
+    },
+    /// Donors are not of this giving mesh, or a landmark is none of its vertices.
+    #[error(
+        "vertex {vertex} gives, but the giving mesh has {n_giver} (counted from 0), or as many values; pass what belongs to \
+         the map"
+    )]
+    Giver {
+        /// The vertex.
+        vertex: usize,
+        /// Vertices of the mesh, or rows of the values.
+        n_giver: usize,
+    },
+    /// A point of the map is on no triangle of this target.
+    #[error(
+        "the map names triangle {face}, but the target mesh has {n_faces} (counted from 0); pass the meshes of the map"
+    )]
+    Face {
+        /// The triangle.
+        face: u32,
+        /// Triangles of the mesh.
+        n_faces: usize,
+    },
+    /// The attributes are not those of the giving mesh.
+    #[error("{problem}; {remedy}")]
+    Attributes {
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// Both shapes do not make one mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),

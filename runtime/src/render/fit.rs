@@ -1,6 +1,6 @@
 //! A skeleton that comes with weights over a map, brought to the place and size of the mesh that receives them.
 
-use super::Donors;
+use super::{Donors, RenderError};
 use crate::Mesh;
 use crate::io::Skin;
 use crate::mesh::vec3;
@@ -18,9 +18,19 @@ const SAME_PLACE: f64 = 0.5;
 ///
 /// The similarity is that of least squares (Umeyama 1991), its scale the ratio of the spreads, which does not shrink where the map is poor.
 ///
-/// # Panics
+/// # Errors
 /// If the donors are not those of both meshes.
-pub fn fit_skeleton(skin: &mut Skin, giver: &Mesh, receiver: &Mesh, donors: &Donors) -> Option<String> {
+pub fn fit_skeleton(
+    skin: &mut Skin,
+    giver: &Mesh,
+    receiver: &Mesh,
+    donors: &Donors,
+) -> Result<Option<String>, RenderError> {
+    donors.check(receiver, giver)?;
+    Ok(fitted(skin, giver, receiver, donors))
+}
+
+fn fitted(skin: &mut Skin, giver: &Mesh, receiver: &Mesh, donors: &Donors) -> Option<String> {
     let pairs = donors.nearest_vertices().enumerate();
     let pairs: Vec<([f64; 3], [f64; 3])> =
         pairs.filter_map(|(r, g)| Some((giver.vertices()[g?], receiver.vertices()[r]))).collect();
@@ -106,7 +116,7 @@ mod tests {
         let n = giver.n_vertices();
         let donors = Donors::of_source(&PointMap::new((0..n as u32).collect(), n));
         let mut fitted = skin();
-        let said = fit_skeleton(&mut fitted, &giver, &receiver, &donors).unwrap();
+        let said = fit_skeleton(&mut fitted, &giver, &receiver, &donors).unwrap().unwrap();
         assert!(said.contains("scaled by 100.0") && said.contains("turned by 90.0 degrees"), "{said}");
         let joint = Mesh::new(vec![[0.2, 0.3, 0.4]], Vec::new()).unwrap();
         let expected = transformed(&joint, TURN, 100.0, [1000.0, 0.0, 0.0]).vertices()[0];
@@ -122,7 +132,7 @@ mod tests {
         let n = giver.n_vertices();
         let donors = Donors::of_source(&PointMap::new((0..n as u32).collect(), n));
         let mut same = skin();
-        assert_eq!(fit_skeleton(&mut same, &giver, &receiver, &donors), None);
+        assert_eq!(fit_skeleton(&mut same, &giver, &receiver, &donors), Ok(None));
         assert_eq!(same, skin());
     }
 }

@@ -76,27 +76,51 @@ impl Donors {
     /// The same with places within the giver's triangles where neighbouring vertices share a donor: the receiver is finer than
     /// the giver, or the map is blurred, and values would come out in steps. Vertices with a donor of their own keep it.
     ///
-    /// # Panics
+    /// # Errors
     /// If the meshes are not those of the donors.
-    pub fn interpolated(self, receiver: &Mesh, giver: &Mesh) -> Self {
+    pub fn interpolated(self, receiver: &Mesh, giver: &Mesh) -> Result<Self, RenderError> {
+        self.check(receiver, giver)?;
         let place = |blend: Blend| Place { blend, corners: giver.faces()[blend.face as usize] };
         let places = blends(&self, receiver, giver).into_iter().map(|blend| blend.map(place)).collect();
-        Self { places, ..self }
+        Ok(Self { places, ..self })
     }
 
     /// The same with the places on the target's surface that the map itself names ([`PointMap::points`]), where the source
     /// receives; as it is for a map without.
     ///
-    /// # Panics
+    /// # Errors
     /// If a place is on no triangle of the target.
-    pub fn on_surface(mut self, map: &PointMap, target: &Mesh) -> Self {
+    pub fn on_surface(mut self, map: &PointMap, target: &Mesh) -> Result<Self, RenderError> {
+        let n_faces = target.n_faces();
+        let named = map.points.iter().flatten().flatten().map(|point| point.face);
+        if let Some(face) = named.into_iter().find(|&face| face as usize >= n_faces) {
+            return Err(RenderError::Face { face, n_faces });
+        }
         for (place, point) in self.places.iter_mut().zip(map.points.iter().flatten()) {
             *place = point.map(|point| Place {
                 blend: Blend { face: point.face, weights: point.weights },
                 corners: target.faces()[point.face as usize],
             });
         }
-        self
+        Ok(self)
+    }
+
+    /// Checks that the donors are of these meshes.
+    pub(super) fn check(&self, receiver: &Mesh, giver: &Mesh) -> Result<(), RenderError> {
+        if self.len() != receiver.n_vertices() {
+            return Err(RenderError::Receiver { found: self.len(), n_receiver: receiver.n_vertices() });
+        }
+        self.check_giver(giver.n_vertices())
+    }
+
+    /// Checks that so many vertices are enough to give from.
+    fn check_giver(&self, n_giver: usize) -> Result<(), RenderError> {
+        let corners = self.places.iter().flatten().flat_map(|place| place.corners);
+        let vertices = self.nearest.iter().flatten().copied().chain(corners).map(|v| v as usize);
+        match vertices.max().filter(|&vertex| vertex >= n_giver) {
+            Some(vertex) => Err(RenderError::Giver { vertex, n_giver }),
+            None => Ok(()),
+        }
     }
 
     /// Number of receiving vertices.
@@ -172,25 +196,31 @@ impl Ord for Ordered {
 /// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match. Labels want
 /// [`Donors::nearest_vertices`] instead.
 ///
-/// # Panics
+/// # Errors
 /// If a donor has no row.
-pub fn transfer_values(values: &Matrix, donors: &Donors) -> Matrix {
+pub fn transfer_values(values: &Matrix, donors: &Donors) -> Result<Matrix, RenderError> {
+    donors.check_giver(values.rows())?;
     let shares: Vec<_> = donors.shares().collect();
-    Matrix::from_fn(shares.len(), values.cols(), |i, j| {
+    Ok(Matrix::from_fn(shares.len(), values.cols(), |i, j| {
         shares[i].map_or(f64::NAN, |shares| weighted(shares, |v| values[(v, j)]))
-    })
+    }))
 }
 
 /// For each landmark of the giver the receiving vertex that takes from nearest to it, if any does.
 ///
-/// # Panics
-/// If a landmark or a donor is no vertex of the giver.
+/// # Errors
+/// If a landmark is no vertex of the giver, or the donors are not those of both meshes.
 pub fn transfer_landmarks(
     landmarks: &[u32],
     giver: &Mesh,
     receiver: &Mesh,
     donors: &Donors,
-) -> Vec<Option<u32>> {
+) -> Result<Vec<Option<u32>>, RenderError> {
+    donors.check(receiver, giver)?;
+    let n_giver = giver.n_vertices();
+    if let Some(vertex) = landmarks.iter().map(|&l| l as usize).find(|&l| l >= n_giver) {
+        return Err(RenderError::Giver { vertex, n_giver });
+    }
     let place = |landmark: u32| {
         let at = giver.vertices()[landmark as usize];
         let candidates = (0..receiver.n_vertices() as u32).zip(donors.iter());
@@ -199,7 +229,7 @@ pub fn transfer_landmarks(
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, v)| v)
     };
-    landmarks.iter().map(|&l| place(l)).collect()
+    Ok(landmarks.iter().map(|&l| place(l)).collect())
 }
 
 /// Colours, texture coordinates, scalar fields and skin weights of the giver, for the receiver's vertices and corners.
@@ -207,14 +237,16 @@ pub fn transfer_landmarks(
 /// Vertices without a match are grey, NaN, -1 (0 where the type has no sign) and without weights, triangles without any at the texture's origin. At a seam of the giver's
 /// texture a vertex has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
 ///
-/// # Panics
+/// # Errors
 /// If the attributes are not those of the giver, or the donors not those of both meshes.
 pub fn transfer_attributes(
     giver: &Mesh,
     attributes: &Attributes,
     receiver: &Mesh,
     donors: &Donors,
-) -> Attributes {
+) -> Result<Attributes, RenderError> {
+    donors.check(receiver, giver)?;
+    attributes.check(giver).map_err(|(problem, remedy)| RenderError::Attributes { problem, remedy })?;
     let color = |colors: &[[u8; 4]], shares: Option<[(usize, f64); 3]>| {
         let mixed = |shares| [0, 1, 2, 3].map(|c| weighted(shares, |v| colors[v][c].into()).round() as u8);
         shares.map_or(super::UNMATCHED_COLOR, mixed)
@@ -223,7 +255,7 @@ pub fn transfer_attributes(
         shares.map_or(f64::NAN, |shares| weighted(shares, |v| values[v]))
     };
     let scalars = attributes.vertex_scalars.iter();
-    Attributes {
+    Ok(Attributes {
         vertex_colors: attributes
             .vertex_colors
             .as_ref()
@@ -239,7 +271,7 @@ pub fn transfer_attributes(
             .map(|field| transfer_integers(field, donors))
             .collect(),
         skin: attributes.skin.as_ref().map(|skin| transfer_skin(skin, donors)),
-    }
+    })
 }
 
 /// Integers are names, not quantities: each vertex takes those of the nearest giving vertex; `missing` without a match.
@@ -289,11 +321,12 @@ mod tests {
         assert_eq!(permutation.len(), donor_of.len());
         let map = PointMap::new(donor_of.clone(), giver.n_vertices());
         let values = Matrix::from_fn(giver.n_vertices(), 2, |i, j| (2 * i + j) as f64);
-        let moved = transfer_values(&values, &Donors::of_source(&map));
+        let moved = transfer_values(&values, &Donors::of_source(&map)).unwrap();
         assert!((0..moved.rows()).all(|v| moved.row(v) == values.row(donor_of[v] as usize)));
-        let back = transfer_values(&moved, &Donors::of_target(&map, &giver).unwrap());
+        let back = transfer_values(&moved, &Donors::of_target(&map, &giver).unwrap()).unwrap();
         assert_eq!(back, values);
-        let landmarks = transfer_landmarks(&donor_of[..5], &giver, &receiver, &Donors::of_source(&map));
+        let landmarks =
+            transfer_landmarks(&donor_of[..5], &giver, &receiver, &Donors::of_source(&map)).unwrap();
         assert_eq!(landmarks, (0..5).map(Some).collect::<Vec<_>>());
     }
 
@@ -319,9 +352,9 @@ mod tests {
         let field = IntegerField { name: "label".into(), kind: crate::io::IntegerKind::I32, values: labels };
         let mut nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
         nearest[7] = PointMap::UNMATCHED;
-        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse);
+        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse).unwrap();
         let given = Attributes { vertex_integers: vec![field.clone()], ..Attributes::default() };
-        let moved = &transfer_attributes(&coarse, &given, &fine, &donors).vertex_integers[0];
+        let moved = &transfer_attributes(&coarse, &given, &fine, &donors).unwrap().vertex_integers[0];
         assert_eq!((moved.kind, moved.values.len(), moved.values[7]), (field.kind, fine.n_vertices(), -1));
         for (v, label) in moved.values.iter().enumerate().filter(|(v, _)| *v != 7) {
             let x = fine.vertices()[v][0];
@@ -341,7 +374,7 @@ mod tests {
             weights: vec![[0.5, 0.25, 0.25, 0.0]; n],
         };
         let nearest = crate::mesh::nearest_vertices(coarse.vertices(), fine.vertices());
-        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse);
+        let donors = Donors::of_source(&PointMap::new(nearest, n)).interpolated(&fine, &coarse).unwrap();
         let moved = transfer_skin(&skin, &donors);
         assert!(
             moved

@@ -25,6 +25,7 @@ pub use way_back::WayBack;
 
 /// Settings of [`Shape::new`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ShapeOptions {
     /// Meshes of more vertices than this are decimated to it; 4 or more, `None`: never. Default 15000, as in the paper.
     pub decimate: Option<usize>,

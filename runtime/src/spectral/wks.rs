@@ -14,6 +14,7 @@ pub const WKS_WIDTH: f64 = 7.0;
 
 /// Options of [`wks`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct WksOptions {
     /// Energies, the width `q` of the signature. Range 1 and up, default 128.
     pub energies: usize,

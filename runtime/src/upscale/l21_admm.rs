@@ -18,6 +18,7 @@ use thiserror::Error;
 
 /// Settings of [`l21_functional_map`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AdmmOptions {
     /// At most so many iterations. Range 0 (least squares) and up, default 200.
     pub max_iterations: usize,

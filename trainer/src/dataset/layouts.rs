@@ -5,6 +5,7 @@
 //! successors of the paper do. TOSCA: one group for each class, every fifth shape validation.
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split, shrec16};
+use fmnet::io::MeshFormat;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -115,8 +116,7 @@ pub(crate) fn mesh_files(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(wrong)? {
         let path = entry.map_err(wrong)?.path();
-        let extension = path.extension().map(|e| e.to_ascii_lowercase());
-        if extension.is_some_and(|e| ["ply", "off", "obj", "glb", "gltf", "stl"].iter().any(|&x| e == x)) {
+        if MeshFormat::from_path(&path).is_some() {
             files.push(path);
         }
     }

@@ -15,7 +15,7 @@ const WIDTH: usize = 900;
 
 /// Every second mesh of a folder matched to the next one, in the order of their names.
 pub(super) fn section(folder: &Path, model: &Path, observer: Observer) -> Result<Section, ReproduceError> {
-    let options = MatchOptions { model: ModelSource::File(model.into()), ..MatchOptions::default() };
+    let options = MatchOptions::default().model(ModelSource::File(model.into()));
     let failed = |e: fmnet::Error| ReproduceError::Evaluate(Box::new(e).into());
     let matcher = Matcher::new(&options).map_err(failed)?;
     let files = mesh_files(folder)?;

@@ -261,14 +261,12 @@ impl TestMethod {
                 (DescriptorKind::Learned, ModelSource::File(model_path(&training_folder(out, name))))
             }
         };
-        let options = MatchOptions {
-            descriptor,
-            model,
-            k: Some(self.k),
-            refinement: Some(self.refinement),
-            cache: Some(cache.to_path_buf()),
-            ..MatchOptions::default()
-        };
+        let options = MatchOptions::default()
+            .descriptor(descriptor)
+            .model(model)
+            .k(self.k)
+            .refinement(self.refinement)
+            .cache(cache.to_path_buf());
         Method { label: self.label.into(), maps: MapSource::Computed(Box::new(options)) }
     }
 }

@@ -3,7 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use fmnet::fmap::{FmapSolver, SolverKind};
 use fmnet::network::Backend;
-use fmnet::pipeline::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Upscaling};
+use fmnet::pipeline::{DescriptorKind, Effort, MatchOptions, ModelSource, Refinement, Resize, Upscaling};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -70,12 +70,12 @@ pub(crate) struct ShapeArgs {
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
-    #[arg(long, value_name = "N|off", value_parser = vertices)]
-    pub(crate) decimate: Option<Vertices>,
+    #[arg(long, value_name = "N|off", value_parser = resize)]
+    pub(crate) decimate: Option<Resize>,
     /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices [default:
     /// 2000; off for features and for the refinements pmf and shared-triangulation]
-    #[arg(long, value_name = "N|off", value_parser = vertices)]
-    pub(crate) subdivide: Option<Vertices>,
+    #[arg(long, value_name = "N|off", value_parser = resize)]
+    pub(crate) subdivide: Option<Resize>,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
     #[arg(long, value_parser = radius)]
     pub(crate) shot_radius: Option<f64>,
@@ -253,14 +253,11 @@ pub(crate) struct InspectArgs {
 }
 
 /// `--decimate` and `--subdivide`: a number of vertices, or never.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Vertices(pub(crate) Option<usize>);
-
-fn vertices(text: &str) -> Result<Vertices, String> {
+fn resize(text: &str) -> Result<Resize, String> {
     match text {
-        "off" => Ok(Vertices(None)),
+        "off" => Ok(Resize::Never),
         _ => match text.parse() {
-            Ok(n) if n >= 100 => Ok(Vertices(Some(n))),
+            Ok(n) if n >= 100 => Ok(Resize::To(n)),
             _ => Err("expected a number of vertices, 100 or more, or `off`".into()),
         },
     }
@@ -289,31 +286,28 @@ impl ShapeArgs {
 
     /// The library's options, those of matching at their defaults.
     pub(crate) fn to_options(&self) -> MatchOptions {
-        MatchOptions {
-            descriptor: self.descriptor,
-            model: self.model_file().map_or(ModelSource::Embedded, ModelSource::File),
-            backend: self.backend,
-            k: self.k.map(usize::from),
-            shot_radius: self.shot_radius,
-            decimate: self.decimate.map(|n| n.0),
-            subdivide: self.subdivide.map(|n| n.0),
-            cache: self.cache.clone(),
-            ..MatchOptions::default()
-        }
+        MatchOptions::default()
+            .descriptor(self.descriptor)
+            .model(self.model_file().map_or(ModelSource::Embedded, ModelSource::File))
+            .backend(self.backend)
+            .k(self.k.map(usize::from))
+            .shot_radius(self.shot_radius)
+            .decimate(self.decimate.unwrap_or_default())
+            .subdivide(self.subdivide.unwrap_or_default())
+            .cache(self.cache.clone())
     }
 }
 
 impl PipelineArgs {
     /// The library's options.
     pub(crate) fn to_options(&self) -> MatchOptions {
-        MatchOptions {
-            solver: FmapSolver::chosen(self.fm, self.mask_weight),
-            refinement: self.refine,
-            upscaling: self.upscale,
-            effort: self.effort,
-            adapt: self.adapt.map(usize::from),
-            ..self.shape.to_options()
-        }
+        let options = self.shape.to_options();
+        options
+            .solver(FmapSolver::chosen(self.fm, self.mask_weight))
+            .refinement(self.refine)
+            .upscaling(self.upscale)
+            .effort(self.effort)
+            .adapt(self.adapt.map(usize::from))
     }
 }
 

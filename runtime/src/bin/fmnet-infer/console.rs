@@ -51,6 +51,7 @@ impl Console {
                 }
             }
             Event::Warning(text) => self.warn(&text),
+            _ => {}
         }
     }
 

@@ -37,6 +37,7 @@ const TASK_VERTICES: usize = 32;
 /// How [`shot`] describes the neighbourhood of a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ShotOptions {
     /// Radius of the support, relative to the square root of the mesh's area. Above 0; 0.067 by default: 9 cm on a
     /// human body, as in the paper's experiments (0.061 to 0.071 on the FAUST registrations, 0.066 in the mean).

@@ -11,6 +11,7 @@ use thiserror::Error;
 /// How [`decimate`](decimate()) chooses its contractions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct DecimateOptions {
     /// Keep every boundary vertex. Default false: boundary vertices are contracted too, along the boundary only and by
     /// the error that this makes in its curve, so that a finely scanned rim gets no more than its share of vertices.

@@ -17,6 +17,7 @@ use thiserror::Error;
 /// What [`repair`](repair()) does besides the necessary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct RepairOptions {
     /// Take vertices at one position, or on a boundary and 1e-5 of the bounding box's diagonal apart, as one where their
     /// faces fit together. Default true.

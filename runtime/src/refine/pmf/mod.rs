@@ -35,6 +35,7 @@ use triangulation::carried_on;
 
 /// Options of [`pmf`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PmfOptions {
     /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a kernel as
     /// wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.

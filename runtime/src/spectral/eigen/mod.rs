@@ -39,6 +39,7 @@ const MANY: usize = 6;
 
 /// Options of [`eigenbasis`].
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct EigenOptions {
     /// Relative residual at which a pair has converged, measured on the inverted operator. From 1e-13 to
     /// 1e-2; default 1e-10. Eigenvalues are accurate to about its square.

@@ -70,11 +70,11 @@ impl Progress {
     /// Shows a stage of the runtime's or of an evaluation.
     pub(crate) fn stage(&self, event: Event) {
         match event {
-            Event::Started { .. } => {}
             Event::Finished { subject, stage, seconds } => {
                 self.say(&format!("{subject}: {stage}, {seconds:.2} s"));
             }
             Event::Warning(text) => self.print(&format!("warning: {text}")),
+            _ => {}
         }
     }
 

@@ -40,7 +40,7 @@ pub struct DiffusionOptions {
 
 impl Default for DiffusionOptions {
     fn default() -> Self {
-        let WksOptions { energies, k } = WksOptions::default();
+        let WksOptions { energies, k, .. } = WksOptions::default();
         Self {
             blocks: 4,
             width: 128,

@@ -108,9 +108,9 @@ pub(super) fn triangulate(
             let dense = (3 * target).clamp(8000, 30_000);
             let start = start(surface, dense)?;
             let independent = remesh(surface, &metric::even(surface, dense), &start, dense, 3);
-            let evenness = 10f64.powf(uniform(rng, -5.0, -2.5));
-            Ok(decimate(&independent, target, &DecimateOptions { evenness, ..DecimateOptions::default() })?
-                .mesh)
+            let mut options = DecimateOptions::default();
+            options.evenness = 10f64.powf(uniform(rng, -5.0, -2.5));
+            Ok(decimate(&independent, target, &options)?.mesh)
         }
         Manner::Marching => marching(surface.mesh, target, rng),
         Manner::Quads => {
@@ -128,7 +128,8 @@ fn by_metric(surface: &Surface, metrics: &[Metric], target: usize) -> Result<Mes
 
 /// The surface with about as many vertices, or all it has.
 fn start(surface: &Surface, target: usize) -> Result<Mesh, SimulateError> {
-    let options = DecimateOptions { evenness: 0.1, ..DecimateOptions::default() };
+    let mut options = DecimateOptions::default();
+    options.evenness = 0.1;
     Ok(decimate(surface.mesh, target, &options)?.mesh)
 }
 

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use fmnet::batch::{Made, MapKeys, Pair, decode_pairs, made_from, read_pairs, write_map};
 use fmnet::causes;
 use fmnet::io::IoError;
-use fmnet::pipeline::{DescribedShape, Match, MatchOptions, Matcher};
+use fmnet::pipeline::{DescribedShape, Match, Matcher};
 use serde_json::{Value, json};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub(crate) fn run(args: &BatchArgs, console: &Console) -> Result<()> {
     create_folder(&args.out)?;
     let options = args.pipeline.to_options();
     let cache = options.cache.clone().unwrap_or_else(|| args.out.join("cache"));
-    let matcher = Matcher::new(&MatchOptions { cache: Some(cache), ..options.clone() })?;
+    let matcher = Matcher::new(&options.clone().cache(cache))?;
     check_outputs(args, &pairs)?;
     let mut keys = MapKeys::new(&matcher, &options, args.partial);
     let mut shapes = Shapes { matcher: &matcher, kept: Vec::new() };
@@ -173,13 +173,12 @@ mod tests {
     use crate::args::Common;
     use fmnet::io::{Attributes, write_mesh};
     use fmnet::mesh::shapes::bumpy_sphere;
-    use fmnet::pipeline::DescriptorKind;
+    use fmnet::pipeline::{DescriptorKind, MatchOptions, Resize};
 
     #[test]
     fn shapes_that_fail_do_not_make_the_store_grow() {
         let folder = tempfile::tempdir().unwrap();
-        let (descriptor, k) = (DescriptorKind::Shot, Some(8));
-        let options = MatchOptions { descriptor, k, subdivide: Some(None), ..MatchOptions::default() };
+        let options = MatchOptions::default().descriptor(DescriptorKind::Shot).k(8).subdivide(Resize::Never);
         let matcher = Matcher::new(&options).unwrap();
         let console = Console::new(&Common { threads: None, quiet: true, json: false });
         let mut shapes = Shapes { matcher: &matcher, kept: Vec::new() };

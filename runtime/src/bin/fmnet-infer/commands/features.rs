@@ -9,7 +9,7 @@ use anyhow::Result;
 use fmnet::Matrix;
 use fmnet::io::{IoError, MeshFile, write_matrix, write_vector};
 use fmnet::network::contract::Quantity;
-use fmnet::pipeline::Matcher;
+use fmnet::pipeline::{Matcher, Resize};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,9 @@ const FILES: [&str; 2] = ["descriptors.npy", "vertices.npy"];
 pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
     let mut options = args.shape.to_options();
     // A row for each vertex of the file, unless more are asked for.
-    options.subdivide = options.subdivide.or(Some(None));
+    if options.subdivide == Resize::Default {
+        options.subdivide = Resize::Never;
+    }
     let matcher = Matcher::new(&options)?;
     let observer = |event| console.event(event);
     let file = read(&args.mesh, console)?;

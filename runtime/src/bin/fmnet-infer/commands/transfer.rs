@@ -45,14 +45,14 @@ pub(crate) fn run(args: &TransferArgs, console: &Console) -> Result<()> {
     let donors = match known {
         true => donors.on_surface(&map, &target.mesh),
         false => donors.interpolated(&receiver.1.mesh, &giver.1.mesh),
-    };
+    }?;
     let has_mesh = values_of_outputs.iter().any(Option::is_none);
     let attributes =
-        if has_mesh { carried(giver, receiver, &donors, console) } else { Attributes::default() };
+        if has_mesh { carried(giver, receiver, &donors, console)? } else { Attributes::default() };
     check_inputs(args, &source, &target, &attributes)?;
     let meshes = (&giver.1.mesh, &receiver.1.mesh);
     let carry = |path: &PathBuf| -> Result<Moved> {
-        Ok(Values::read(path, meshes.0)?.carried(meshes.0, meshes.1, &donors))
+        Ok(Values::read(path, meshes.0)?.carried(meshes.0, meshes.1, &donors)?)
     };
     let moved = values_of_outputs.iter().map(|values| values.map(carry).transpose());
     let moved = moved.collect::<Result<Vec<_>>>()?;
@@ -100,7 +100,7 @@ fn carried(
     (receiver_path, receiver): (&Path, &MeshFile),
     donors: &Donors,
     console: &Console,
-) -> Attributes {
+) -> Result<Attributes> {
     for what in &giver.info.left_out {
         console.warn(&format!("{}: not carried: {what}", giver_path.display()));
     }
@@ -114,9 +114,9 @@ fn carried(
             giver_path.display()
         ));
     }
-    let mut moved = transfer_attributes(&giver.mesh, &giver.attributes, &receiver.mesh, donors);
+    let mut moved = transfer_attributes(&giver.mesh, &giver.attributes, &receiver.mesh, donors)?;
     if let Some(skin) = &mut moved.skin
-        && let Some(fitted) = fit_skeleton(skin, &giver.mesh, &receiver.mesh, donors)
+        && let Some(fitted) = fit_skeleton(skin, &giver.mesh, &receiver.mesh, donors)?
     {
         let skeleton = "the skeleton was fitted to";
         console.warn(&format!("{skeleton} {}: {fitted}", receiver_path.display()));
@@ -126,7 +126,7 @@ fn carried(
         let (own, others) = (receiver_path.display(), giver_path.display());
         console.warn(&format!("{own}: replaced by what {others} has: {}", some_of(&replaced)));
     }
-    merged
+    Ok(merged)
 }
 
 /// What the receiving file carries that no output will.

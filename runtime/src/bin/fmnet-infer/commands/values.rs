@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use fmnet::io::{NpyArray, read_npy, read_point_map, write_atomically, write_npy};
-use fmnet::render::{Donors, transfer_landmarks, transfer_values};
+use fmnet::render::{Donors, RenderError, transfer_landmarks, transfer_values};
 use fmnet::{Matrix, Mesh};
 use std::path::Path;
 
@@ -33,15 +33,20 @@ impl Values {
     }
 
     /// The values that the receiver gets: numbers mixed, integers of the nearest vertex.
-    pub(super) fn carried(&self, giver: &Mesh, receiver: &Mesh, donors: &Donors) -> Moved {
-        match self {
+    pub(super) fn carried(
+        &self,
+        giver: &Mesh,
+        receiver: &Mesh,
+        donors: &Donors,
+    ) -> Result<Moved, RenderError> {
+        Ok(match self {
             Self::Landmarks(landmarks) => {
                 let known: Vec<u32> = landmarks.iter().flatten().copied().collect();
-                let mut moved = transfer_landmarks(&known, giver, receiver, donors).into_iter();
+                let mut moved = transfer_landmarks(&known, giver, receiver, donors)?.into_iter();
                 Moved::Landmarks(landmarks.iter().map(|l| l.and_then(|_| moved.next().flatten())).collect())
             }
             Self::Field(NpyArray::Floats(values, kind)) => {
-                Moved::Field(NpyArray::Floats(transfer_values(values, donors), *kind), 0)
+                Moved::Field(NpyArray::Floats(transfer_values(values, donors)?, *kind), 0)
             }
             Self::Field(NpyArray::Integers(values, kind)) => {
                 let nearest: Vec<Option<usize>> = donors.nearest_vertices().collect();
@@ -52,7 +57,7 @@ impl Values {
                 let n_missing = if missing == 0 { nearest.iter().filter(|v| v.is_none()).count() } else { 0 };
                 Moved::Field(NpyArray::Integers(moved, *kind), n_missing)
             }
-        }
+        })
     }
 }
 

@@ -60,17 +60,15 @@ fn methods(args: &CalibrateArgs) -> Vec<Method> {
         true => ModelSource::Embedded,
         false => ModelSource::File(args.model.clone()),
     };
-    let method = |label: &str, descriptor, k, refinement| {
-        let options = MatchOptions {
-            descriptor,
-            model: model.clone(),
-            k,
-            solver: Some(FmapSolver::new(SolverKind::Joint, None)),
-            refinement: Some(refinement),
-            effort: Effort::Low,
-            cache: args.cache.clone(),
-            ..MatchOptions::default()
-        };
+    let method = |label: &str, descriptor: DescriptorKind, k: Option<usize>, refinement: Refinement| {
+        let options = MatchOptions::default()
+            .descriptor(descriptor)
+            .model(model.clone())
+            .k(k)
+            .solver(FmapSolver::new(SolverKind::Joint, None))
+            .refinement(refinement)
+            .effort(Effort::Low)
+            .cache(args.cache.clone());
         Method { label: label.into(), maps: MapSource::Computed(Box::new(options)) }
     };
     let (learned, shot) = (DescriptorKind::Learned, DescriptorKind::Shot);

@@ -65,15 +65,13 @@ fn methods(args: &EvaluateArgs) -> Vec<Method> {
     let mut methods = Vec::new();
     for (name, descriptor, model) in descriptors {
         for &refinement in &args.refine {
-            let options = MatchOptions {
-                descriptor,
-                model: model.clone(),
-                k: args.k.map(usize::from),
-                solver: FmapSolver::chosen(args.fm, args.mask_weight),
-                refinement: Some(refinement),
-                cache: args.cache.clone(),
-                ..MatchOptions::default()
-            };
+            let options = MatchOptions::default()
+                .descriptor(descriptor)
+                .model(model.clone())
+                .k(args.k.map(usize::from))
+                .solver(FmapSolver::chosen(args.fm, args.mask_weight))
+                .refinement(refinement)
+                .cache(args.cache.clone());
             let maps = MapSource::Computed(Box::new(options));
             methods.push(Method { label: format!("{name}{}", suffix(refinement)), maps });
         }
@@ -86,15 +84,17 @@ fn methods(args: &EvaluateArgs) -> Vec<Method> {
 }
 
 /// What labels call a refinement.
-fn suffix(refinement: Refinement) -> &'static str {
-    match refinement {
-        Refinement::None => "",
-        Refinement::Icp => " + ICP",
-        Refinement::Zoomout => " + ZoomOut",
-        Refinement::Wavelet => " + wavelet filter",
-        Refinement::Pmf => " + PMF",
-        Refinement::SharedTriangulation => " + PMF, shared triangulation",
-    }
+fn suffix(refinement: Refinement) -> String {
+    let name = match refinement {
+        Refinement::None => return String::new(),
+        Refinement::Icp => "ICP",
+        Refinement::Zoomout => "ZoomOut",
+        Refinement::Wavelet => "wavelet filter",
+        Refinement::Pmf => "PMF",
+        Refinement::SharedTriangulation => "PMF, shared triangulation",
+        other => return format!(" + {other:?}"),
+    };
+    format!(" + {name}")
 }
 
 fn read_curves(path: &Path) -> Result<Vec<(String, ErrorCurve)>> {
