@@ -8,7 +8,7 @@ use fmnet::network::{Backend, DescriptorNetwork, NetworkError};
 use fmnet::pipeline::{DescriptorKind, MatchOptions, Resize, match_meshes};
 use fmnet::point_map::PointMap;
 use fmnet::quality::{Quality, Side, SurfaceFrame};
-use fmnet::refine::{RefineError, WaveletOptions, wavelet};
+use fmnet::refine::{RefineError, WaveletHints, WaveletOptions, wavelet};
 use fmnet::render::{
     Donors, RenderError, fit_skeleton, transfer_attributes, transfer_landmarks, transfer_values,
 };
@@ -80,11 +80,15 @@ fn anchors_and_maps_back_of_other_shapes_are_refused() {
     let laplacian = Laplacian::new(&mesh);
     let (basis, _) = eigenbasis(&laplacian, 20, &EigenOptions::default()).unwrap();
     let map = identity(mesh.n_vertices());
-    let mut options = WaveletOptions::at(20);
+    let options = WaveletOptions::at(20);
+    let other = bumpy_sphere(1, 1);
+    let hints = WaveletHints { anchors: None, meshes: Some([&mesh, &other]) };
+    let refused = wavelet([&map, &map], &basis, &basis, hints, &options);
+    assert!(matches!(refused, Err(RefineError::Meshes { .. })), "{refused:?}");
     for shape in [(3, 1), (mesh.n_vertices(), 2)] {
-        options.anchors =
-            Some(Box::new([Matrix::zeros(mesh.n_vertices(), 1), Matrix::zeros(shape.0, shape.1)]));
-        let refused = wavelet([&map, &map], &basis, &basis, &options);
+        let anchors = [Matrix::zeros(mesh.n_vertices(), 1), Matrix::zeros(shape.0, shape.1)];
+        let hints = WaveletHints { anchors: Some(&anchors), meshes: None };
+        let refused = wavelet([&map, &map], &basis, &basis, hints, &options);
         assert!(matches!(refused, Err(RefineError::Descriptors { .. })), "{refused:?}");
     }
     let frame = SurfaceFrame::new(&mesh);

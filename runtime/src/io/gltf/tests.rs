@@ -2,7 +2,11 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::Mesh;
-use crate::io::{Attributes, IntegerField, IntegerKind, Joint, Skin, Texture};
+use crate::io::{Attributes, IntegerField, IntegerKind, IoError, Joint, Skin, Texture};
+
+fn write(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
+    crate::io::write_mesh(path, mesh, attributes)
+}
 
 /// A GLB file of JSON and binary chunk.
 fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
