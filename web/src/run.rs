@@ -14,7 +14,7 @@ use std::path::Path;
 const CONFIDENT: f32 = 0.5;
 
 fn matcher() -> Result<Matcher, fmnet::Error> {
-    // The library's own kernels; tract would make the module larger.
+    // The library's own kernels: nothing else has to be compiled into the module.
     Matcher::new(&MatchOptions { backend: Backend::Native, ..MatchOptions::default() })
 }
 

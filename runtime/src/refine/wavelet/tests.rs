@@ -105,9 +105,9 @@ fn exchanging_the_shapes_exchanges_the_maps() {
     let found = refined(&start, [&source, &target], &options());
     let [forth, back] = start;
     let other = refined(&[back, forth], [&target, &source], &options());
-    // All but ties, of which a regular grid has many.
-    assert!(share_equal(&found.map, &other.map_back) > 0.99);
-    assert!(share_equal(&found.map_back, &other.map) > 0.99);
+    // All but ties to single precision, of which a regular grid has many.
+    let shares = [share_equal(&found.map, &other.map_back), share_equal(&found.map_back, &other.map)];
+    assert!(shares.iter().all(|&share| share > 0.98), "{shares:?}");
 }
 
 #[test]
