@@ -55,9 +55,9 @@ fn all_donors<'a>(source: &'a Mesh, target: &'a Mesh, map: &PointMap) -> Vec<(&'
     let (to_source, to_target) =
         (Donors::of_source(map), Donors::of_target(map, target).expect("the map is of the target"));
     vec![
-        (target, source, to_source.clone().interpolated(source, target).unwrap()),
+        (target, source, to_source.clone().interpolated(source, target).expect("points of both meshes")),
         (target, source, to_source),
-        (source, target, to_target.clone().interpolated(target, source).unwrap()),
+        (source, target, to_target.clone().interpolated(target, source).expect("points of both meshes")),
         (source, target, to_target),
     ]
 }
