@@ -73,7 +73,7 @@ fn every_candidate_is_listed_and_one_is_taken() {
     let summary: Value = serde_json::from_str(&work.succeed(&arguments)).unwrap();
     let candidates = summary["candidates"].as_array().unwrap();
     let names: Vec<&str> = candidates.iter().map(|c| c["name"].as_str().unwrap()).collect();
-    for name in ["default", "coarse to fine", "features alone", "adapted"] {
+    for name in ["default", "without descriptors beside", "features alone", "adapted"] {
         assert!(names.contains(&name), "{names:?}");
     }
     let taken: Vec<&Value> = candidates.iter().filter(|c| c["taken"] == true).collect();

@@ -178,8 +178,9 @@ pub(crate) fn transfer_landmarks<'py>(
     let landmarks = landmarks.map_err(|v| {
         wrong(format!("landmarks: there is no vertex {v}; the giving mesh has {n} (0-based)"))
     })?;
-    let moved =
-        run(py, None, move |_| Ok(carry_landmarks(&landmarks, &way.giver, &way.receiver, &way.donors)))?;
+    let moved = run(py, None, move |_| {
+        carry_landmarks(&landmarks, &way.giver, &way.receiver, &way.donors).map_err(said)
+    })?;
     Ok(PyArray1::from_vec(py, moved.iter().map(|v| v.map_or(-1, |v| v as i32)).collect()))
 }
 
