@@ -15,7 +15,9 @@ const CONFIDENT: f32 = 0.5;
 
 fn matcher() -> Result<Matcher, fmnet::Error> {
     // The library's own kernels: nothing else has to be compiled into the module.
-    Matcher::new(&MatchOptions { backend: Backend::Native, ..MatchOptions::default() })
+    let mut options = MatchOptions::default();
+    options.backend = Backend::Native;
+    Matcher::new(&options)
 }
 
 pub(crate) fn describe(name: &str, file: Box<[u8]>, whole_area: Option<f64>) -> Result<(), Box<dyn Error>> {
@@ -68,6 +70,7 @@ fn tell(event: Event) {
         Event::Started { subject, stage } => json!({ "started": stage, "subject": subject }),
         Event::Finished { subject, stage, .. } => json!({ "finished": stage, "subject": subject }),
         Event::Warning(text) => json!({ "warning": text }),
+        _ => return,
     };
     send("event", value.to_string().as_bytes());
 }
