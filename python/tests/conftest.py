@@ -1,14 +1,14 @@
 """Meshes, and the program beside which results are held."""
 
-import os
-import shutil
-import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+from program import program  # noqa: E402, F401
 
 
 @pytest.fixture(scope="session")
@@ -16,22 +16,6 @@ def demo():
     """The two bodies of the demo: files of 2400 vertices, of which the first 1000 correspond by index."""
     folder = ROOT / "runtime" / "demo"
     return folder / "source.ply", folder / "target.ply"
-
-
-@pytest.fixture(scope="session")
-def program():
-    """Runs ``fmnet-infer``; skips where it was not built."""
-    found = os.environ.get("FMNET_INFER") or ROOT / "target" / "release" / "fmnet-infer"
-    found = shutil.which(found)
-    if found is None:
-        pytest.skip("no fmnet-infer: build it (cargo build --release --workspace --bin fmnet-infer) or name it in FMNET_INFER")
-
-    def run(*arguments):
-        done = subprocess.run([found, "--quiet", *map(str, arguments)], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    return run
 
 
 def sphere(subdivisions=3, seed=0):

@@ -77,7 +77,7 @@ fn anchors_and_maps_back_of_other_shapes_are_refused() {
     let laplacian = Laplacian::new(&mesh);
     let (basis, _) = eigenbasis(&laplacian, 20, &EigenOptions::default()).unwrap();
     let map = identity(mesh.n_vertices());
-    let options = WaveletOptions::at(20);
+    let options = WaveletOptions::coarse_to_fine(20, 20);
     let other = bumpy_sphere(1, 1);
     let hints = WaveletHints { anchors: None, meshes: Some([&mesh, &other]) };
     let refused = wavelet([&map, &map], &basis, &basis, hints, &options);

@@ -4,13 +4,15 @@ import functools
 import http.server
 import os
 import shutil
-import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+from program import program  # noqa: E402, F401
 DIST = ROOT / "web" / "dist"
 DEMO = [ROOT / "runtime" / "demo" / name for name in ("source.ply", "target.ply")]
 
@@ -61,21 +63,6 @@ def page(browser, site):
     yield page
     context.close()
     assert not problems, problems
-
-
-@pytest.fixture(scope="session")
-def program():
-    """Runs ``fmnet-infer``; skips where it was not built."""
-    found = shutil.which(os.environ.get("FMNET_INFER") or ROOT / "target" / "release" / "fmnet-infer")
-    if found is None:
-        pytest.skip("no fmnet-infer: build it (cargo build --release --workspace --bin fmnet-infer) or name it in FMNET_INFER")
-
-    def run(*arguments):
-        done = subprocess.run([found, "--quiet", *map(str, arguments)], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    return run
 
 
 @pytest.fixture(scope="session")

@@ -63,11 +63,6 @@ impl Default for WaveletOptions {
 }
 
 impl WaveletOptions {
-    /// Five rounds at `k` eigenfunctions: for a start that is right up to details.
-    pub fn at(k: usize) -> Self {
-        Self { stages: vec![WaveletStage { k, rounds: 5 }], part: false }
-    }
-
     /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 3 rounds at 60, 2 at 128, 3 at 200. For a start of
     /// which the rough is right; what it has of details the descriptors beside the embedding keep.
     pub fn coarse_to_fine(k_start: usize, k_max: usize) -> Self {
