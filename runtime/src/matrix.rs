@@ -86,8 +86,21 @@ impl<T: Copy> Matrix<T> {
     /// # Panics
     /// If there is no such row.
     pub fn select_rows(&self, indices: &[u32]) -> Self {
-        let data = indices.iter().flat_map(|&i| self.row(i as usize).iter().copied()).collect();
+        let mut data = Vec::with_capacity(indices.len() * self.cols);
+        indices.iter().for_each(|&i| data.extend_from_slice(self.row(i as usize)));
         Self { rows: indices.len(), cols: self.cols, data }
+    }
+
+    /// The columns of all parts, at least one, beside each other.
+    ///
+    /// # Panics
+    /// If they have not equally many rows.
+    pub(crate) fn beside(parts: &[&Self]) -> Self {
+        let (rows, cols) = (parts[0].rows, parts.iter().map(|part| part.cols).sum());
+        assert!(parts.iter().all(|part| part.rows == rows), "parts beside each other differ in their rows");
+        let mut data = Vec::with_capacity(rows * cols);
+        (0..rows).for_each(|i| parts.iter().for_each(|part| data.extend_from_slice(part.row(i))));
+        Self { rows, cols, data }
     }
 
     /// The transpose, `[cols, rows]`, copied.

@@ -7,7 +7,7 @@ use super::pair::Pair;
 use crate::Matrix;
 use crate::error::Error;
 use crate::mesh::{SurfacePoint, vertices_on_surface};
-use crate::point_map::{PointMap, beside};
+use crate::point_map::PointMap;
 use crate::shape::{Shape, WayBack};
 use crate::spectral::Eigenbasis;
 use thiserror::Error;
@@ -75,7 +75,7 @@ impl Landmarks {
         let factor = (IN_SYSTEM * (squares(&hats[0]) + squares(&hats[1]))
             / (squares(&own[0]) + squares(&own[1])))
         .sqrt();
-        std::array::from_fn(|i| beside(&hats[i], &own[i].map(|x| factor * x)))
+        std::array::from_fn(|i| Matrix::beside(&[&hats[i], &own[i].map(|x| factor * x)]))
     }
 
     /// Columns to be set beside the rows of embeddings whose rows have a squared length of `mean_square` in the mean.

@@ -9,7 +9,8 @@ use crate::error::Error;
 use crate::events::{Event, timed};
 use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
-use crate::point_map::{Comparison, Embedding, PointMap, beside};
+use crate::point_map::search::{AlongEdges, Guesses};
+use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
 use crate::refine::{
     IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf,
@@ -202,12 +203,24 @@ impl Pair<'_> {
         }
         let anchors = self.anchors(Some(descriptors), landmarks);
         if comparison == Comparison::Joint {
-            let [map, back] = embedding.both()?;
+            let [map, back] = self.first_maps(&embedding)?;
             return Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors });
         }
         let map = embedding.forth()?;
         let back = maps.clone().reversed().point_map(comparison, &bases[1], &bases[0])?;
         Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors })
+    }
+
+    /// The point maps of both directions; for the filter, which begins anew from samples, those that samples lead to.
+    fn first_maps(&self, embedding: &Embedding) -> Result<[PointMap; 2], Error> {
+        if self.matcher.refinement(self.is_part()) != Refinement::Wavelet {
+            return Ok(embedding.both()?);
+        }
+        let shapes = [&self.source.shape, &self.target.shape];
+        let areas = shapes.map(|shape| shape.laplacian());
+        let edges = AlongEdges::new(shapes.map(|shape| shape.mesh()), [&areas[0].mass, &areas[1].mass]);
+        let matches = embedding.matches_along(&edges, Guesses::Samples).map_err(RecoverError::from)?;
+        Ok(embedding.point_maps(matches))
     }
 
     /// What counts beside the embeddings of refinement: descriptors, where a model was trained to tell vertices by them, and
@@ -225,7 +238,7 @@ impl Pair<'_> {
         // Rows of a joint embedding at unit area have a squared length of about twice the eigenfunctions.
         let given = landmarks.map(|landmarks| landmarks.anchors(2.0 * self.refined_k() as f64));
         let columns = match (own, given) {
-            (Some(own), Some(given)) => [beside(&own[0], &given[0]), beside(&own[1], &given[1])],
+            (Some(own), Some(given)) => [Matrix::beside(&[&own[0], &given[0]]), Matrix::beside(&[&own[1], &given[1]])],
             (own, given) => own.or(given)?,
         };
         Some(Box::new(columns))

@@ -2,11 +2,10 @@
 
 use super::recover::{Comparison, check_shape, cosines, transport};
 use super::search::{
-    NearestRows, Rows, SearchError, mutual_climb, mutual_nearest, nearest_rows, squared_norms,
+    AlongEdges, Guesses, NearestRows, Rows, SearchError, mutual_nearest, nearest_rows, squared_norms,
 };
 use super::{PointMap, RecoverError};
 use crate::Matrix;
-use crate::mesh::Adjacency;
 use crate::spectral::Eigenbasis;
 
 /// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
@@ -39,13 +38,35 @@ impl Embedding {
         basis_source: &Eigenbasis,
         basis_target: &Eigenbasis,
     ) -> Result<Self, RecoverError> {
+        let rows = Self::joint_beside(forth, back, [basis_source, basis_target], None)?;
+        let sum = Matrix::from_fn(forth.rows(), forth.cols(), |i, j| forth[(i, j)] + back[(j, i)]);
+        let phi = transport(&basis_source.eigenvectors, &sum);
+        Ok(Self { factors: Some([phi, basis_target.eigenvectors.clone()]), ..rows })
+    }
+
+    /// As [`Embedding::joint`], with further columns beside the rows, `[n_source, a]` and `[n_target, a]`; for its rows, as it is
+    /// searched in twice the width.
+    ///
+    /// # Errors
+    /// If a map is not of that shape.
+    pub(crate) fn joint_beside(
+        forth: &Matrix,
+        back: &Matrix,
+        [basis_source, basis_target]: [&Eigenbasis; 2],
+        columns: Option<&[Matrix; 2]>,
+    ) -> Result<Self, RecoverError> {
         check_shape(forth, basis_source, basis_target)?;
         check_shape(back, basis_target, basis_source)?;
         let (phi, psi) = (&basis_source.eigenvectors, &basis_target.eigenvectors);
-        let (to_target, to_source) = rayon::join(|| transport(phi, forth), || transport(psi, back));
-        let sum = Matrix::from_fn(forth.rows(), forth.cols(), |i, j| forth[(i, j)] + back[(j, i)]);
-        let factors = Some([transport(phi, &sum), psi.clone()]);
-        Ok(Self { source: beside(&to_target, phi), target: beside(psi, &to_source), factors })
+        let rows = |joint: [&Matrix; 2], columns: Option<&Matrix>| {
+            let parts: Vec<&Matrix> = joint.into_iter().chain(columns).collect();
+            Matrix::beside(&parts)
+        };
+        let (source, target) = rayon::join(
+            || rows([&transport(phi, forth), phi], columns.map(|[of_source, _]| of_source)),
+            || rows([psi, &transport(psi, back)], columns.map(|[_, of_target]| of_target)),
+        );
+        Ok(Self { source, target, factors: None })
     }
 
     /// The embedding of one functional map `c`, `[k_target, k_source]`, for a comparison; joint with its adjoint.
@@ -84,6 +105,7 @@ impl Embedding {
     /// # Panics
     /// If they have not as many rows.
     pub(crate) fn with_columns(&self, source: &Matrix, target: &Matrix) -> Self {
+        let beside = |left: &Matrix, right: &Matrix| Matrix::beside(&[left, right]);
         let factors =
             self.factors.as_ref().map(|[left, right]| [beside(left, source), beside(right, target)]);
         Self { source: beside(&self.source, source), target: beside(&self.target, target), factors }
@@ -125,16 +147,16 @@ impl Embedding {
         [map(&self.source, &self.target, forth), map(&self.target, &self.source, back)]
     }
 
-    /// Matches near the given ones, along the edges of both meshes: rows that none of their neighbours is nearer than.
+    /// Matches from guesses along the edges of both meshes: rows that none of their neighbours is nearer than.
     ///
     /// # Errors
     /// If a row of a shape is not finite.
-    pub(crate) fn matches_near(
+    pub(crate) fn matches_along(
         &self,
-        [forth, back]: &[Vec<u32>; 2],
-        around: [&Adjacency; 2],
+        edges: &AlongEdges,
+        guesses: Guesses,
     ) -> Result<[Vec<u32>; 2], SearchError> {
-        mutual_climb(self.rounded().each_ref(), [forth, back], around)
+        edges.nearest(self.rounded().each_ref(), guesses)
     }
 
     /// Rows in single precision whose products give the distances.
@@ -171,12 +193,6 @@ fn nearest(queries: &Matrix, rows: &Matrix) -> Result<PointMap, RecoverError> {
     let targets = NearestRows::new(rows)?.nearest(queries)?.index;
     let confidence = Some(cosines(queries, rows, &targets));
     Ok(PointMap { targets, confidence, points: None, n_target: rows.rows() })
-}
-
-/// `[left, right]`, two matrices of as many rows beside each other.
-pub(crate) fn beside(left: &Matrix, right: &Matrix) -> Matrix {
-    let rows = (0..left.rows()).flat_map(|i| left.row(i).iter().chain(right.row(i)).copied());
-    Matrix::from_vec(left.rows(), left.cols() + right.cols(), rows.collect())
 }
 
 #[cfg(test)]

@@ -7,7 +7,6 @@ pub mod search;
 mod types;
 
 pub use embedding::Embedding;
-pub(crate) use embedding::beside;
 pub use precise::EmbeddedSurface;
 pub use recover::{Comparison, RecoverError, recover, recover_by};
 pub use types::PointMap;

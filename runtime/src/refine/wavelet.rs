@@ -12,9 +12,9 @@ use super::zoomout::least_squares_map;
 use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
-use crate::mesh::{Adjacency, Mesh, Topology};
-use crate::point_map::search::{Rows, SearchError, mutual_climb, mutual_nearest};
-use crate::point_map::{Comparison, Embedding, PointMap};
+use crate::mesh::Mesh;
+use crate::point_map::search::{AlongEdges, Guesses, mutual_nearest};
+use crate::point_map::{Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
 use single::SingleRounds;
@@ -45,8 +45,9 @@ pub struct WaveletHints<'a> {
     /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: descriptors, or
     /// landmarks.
     pub anchors: Option<&'a [Matrix; 2]>,
-    /// The meshes that the bases are of, source and target. With them the rounds after the first stage, or the first round of a single
-    /// one, search along the edges from the match before, which takes a tenth of the time; without them, through all vertices.
+    /// The meshes that the bases are of, source and target. With them rounds search along the edges from the match before, which takes
+    /// a tenth of the time; those of the first stage of several, or the first round of a single one, also from what 1000 samples of
+    /// each shape find among each other. Without them, rounds search through all vertices.
     pub meshes: Option<[&'a Mesh; 2]>,
 }
 
@@ -134,102 +135,88 @@ pub fn wavelet(
     let ks = rounds(&options.stages, basis_source.k().min(basis_target.k()));
     let mut images = maps.map(|map| map.targets.clone());
     let rough = if options.stages.len() > 1 { options.stages[0].rounds } else { 1 };
-    let mut search = Search::new(hints.meshes, rough);
+    let mut search = Search::new(hints.meshes, bases, rough);
     let mut level = Level::new(bases, hints.anchors, ks[0]);
     for &k in &ks[..ks.len() - 1] {
-        level = level.at(k, bases);
+        level = level.at(k);
         images = level.round(&images, &mut search)?;
     }
-    let (functional_maps, embedding) = level.at(ks[ks.len() - 1], bases).embedded(&images)?;
-    let found = search.in_embedding(&embedding, &images)?;
-    let [map, map_back] = embedding.point_maps(found);
+    level = level.at(ks[ks.len() - 1]);
+    let (functional_maps, embedding) = level.embedded(&images)?;
+    let [map, map_back] = embedding.point_maps(level.round(&images, &mut search)?);
     Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds: ks } })
 }
 
 /// How the vertices are matched in an embedding.
 struct Search {
-    around: Option<[Adjacency; 2]>,
-    /// Rounds through all vertices that are left.
+    /// The edges to search along; without them all vertices are searched through.
+    edges: Option<AlongEdges>,
+    /// First rounds that are left.
     rough: usize,
 }
 
 impl Search {
-    fn new(meshes: Option<[&Mesh; 2]>, rough: usize) -> Self {
-        Self { around: meshes.map(|meshes| meshes.map(|mesh| Topology::new(mesh).adjacency())), rough }
+    fn new(meshes: Option<[&Mesh; 2]>, bases: [&Eigenbasis; 2], rough: usize) -> Self {
+        let edges = meshes.map(|meshes| AlongEdges::new(meshes, bases.map(|basis| &basis.mass[..])));
+        Self { edges, rough }
     }
 
-    /// The edges to search along, unless all vertices are to be searched through.
-    fn along(&mut self) -> Option<[&Adjacency; 2]> {
-        let near = self.rough == 0;
+    /// What the next round begins with.
+    fn guesses<'a>(&mut self, before: &'a [Vec<u32>; 2]) -> Guesses<'a> {
+        let rough = self.rough > 0;
         self.rough = self.rough.saturating_sub(1);
-        self.around.as_ref().filter(|_| near).map(|around| around.each_ref())
-    }
-
-    fn in_embedding(
-        &mut self,
-        embedding: &Embedding,
-        before: &[Vec<u32>; 2],
-    ) -> Result<[Vec<u32>; 2], SearchError> {
-        match self.along() {
-            Some(around) => embedding.matches_near(before, around),
-            None => embedding.matches(),
-        }
-    }
-
-    fn among(&mut self, rows: &[Rows; 2], before: &[Vec<u32>; 2]) -> Result<[Vec<u32>; 2], SearchError> {
-        match self.along() {
-            Some(around) => {
-                mutual_climb(rows.each_ref(), before.each_ref().map(|images| &images[..]), around)
-            }
-            None => mutual_nearest(rows.each_ref()),
-        }
+        if rough { Guesses::MatchesAndSamples(before) } else { Guesses::Matches(before) }
     }
 }
 
 /// What rounds need of both shapes: `k` eigenfunctions, and columns beside the embedding.
 struct Level<'a> {
-    bases: [Eigenbasis; 2],
+    k: usize,
+    bases: [&'a Eigenbasis; 2],
     anchors: Option<&'a [Matrix; 2]>,
     mask: Matrix,
     single: SingleRounds,
 }
 
 impl<'a> Level<'a> {
-    fn new(bases: [&Eigenbasis; 2], anchors: Option<&'a [Matrix; 2]>, k: usize) -> Self {
-        let bases = bases.map(|basis| basis.truncated(k));
-        let mask = filter_mask(&scale_free_eigenvalues(&bases[0]), &scale_free_eigenvalues(&bases[1]));
-        let single = SingleRounds::new(&bases, &mask, anchors);
-        Self { bases, anchors, mask, single }
+    fn new(bases: [&'a Eigenbasis; 2], anchors: Option<&'a [Matrix; 2]>, k: usize) -> Self {
+        let [source, target] = bases.map(|basis| scale_free_eigenvalues(basis)[..k].to_vec());
+        let mask = filter_mask(&source, &target);
+        let single = SingleRounds::new(bases, k, &mask, anchors);
+        Self { k, bases, anchors, mask, single }
     }
 
     /// The same, with `k` eigenfunctions.
-    fn at(self, k: usize, bases: [&Eigenbasis; 2]) -> Self {
-        if self.bases[0].k() == k { self } else { Self::new(bases, self.anchors, k) }
+    fn at(self, k: usize) -> Self {
+        if self.k == k { self } else { Self::new(self.bases, self.anchors, k) }
     }
 
-    /// The matches of a round; in single precision where all vertices had one and are not too many.
+    /// The matches of a round; in single precision where all vertices had one, and along the edges or between small shapes.
     fn round(&self, images: &[Vec<u32>; 2], search: &mut Search) -> Result<[Vec<u32>; 2], RefineError> {
+        let guesses = search.guesses(images);
         let complete = images.iter().flatten().all(|&image| image != PointMap::UNMATCHED);
-        if complete && Embedding::is_small(self.bases[0].n(), self.bases[1].n()) {
-            return Ok(search.among(&self.single.embedded(images), images)?);
-        }
-        Ok(search.in_embedding(&self.embedded(images)?.1, images)?)
+        let small = Embedding::is_small(self.bases[0].n(), self.bases[1].n());
+        Ok(match &search.edges {
+            Some(edges) if complete => edges.nearest(self.single.embedded(images).each_ref(), guesses)?,
+            None if complete && small => mutual_nearest(self.single.embedded(images).each_ref())?,
+            _ => self.embedded(images)?.1.matches()?,
+        })
     }
 
     /// The filtered functional maps of a pair of point maps, and the embedding in which they compare the vertices.
     fn embedded(&self, images: &[Vec<u32>; 2]) -> Result<(BothMaps, Embedding), RefineError> {
-        let maps = self.filtered_maps(images)?;
-        let embedding = maps.embedding(Comparison::Joint, &self.bases[0], &self.bases[1])?;
-        let embedding = match self.anchors {
-            Some([of_source, of_target]) => embedding.with_columns(of_source, of_target),
-            None => embedding,
-        };
+        let bases = self.bases.map(|basis| basis.truncated(self.k));
+        let maps = self.filtered_maps(images, &bases)?;
+        let embedding = Embedding::joint_beside(&maps.forth, &maps.back, bases.each_ref(), self.anchors)?;
         Ok((maps, embedding))
     }
 
     /// The filtered functional maps, `[k, k]`, of a pair of point maps.
-    fn filtered_maps(&self, [forth, back]: &[Vec<u32>; 2]) -> Result<BothMaps, RefineError> {
-        let [source, target] = &self.bases;
+    fn filtered_maps(
+        &self,
+        [forth, back]: &[Vec<u32>; 2],
+        [source, target]: &[Eigenbasis; 2],
+    ) -> Result<BothMaps, RefineError> {
         let (c12, c21) = rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
         let filtered = |c: &Matrix, weight: &dyn Fn(usize, usize) -> f64| {
             Matrix::from_fn(c.rows(), c.cols(), |i, j| weight(i, j) * c[(i, j)])

@@ -15,16 +15,16 @@
 //! than their rounding error; distances in `f64`, summed in one fixed order. The answer is therefore that of
 //! a plain double loop, for any number of threads.
 
+mod along_edges;
 mod bisect;
-mod climb;
 mod kernels;
 mod leaves;
 mod mutual;
 mod query;
 
 use crate::Matrix;
+pub(crate) use along_edges::{AlongEdges, Guesses};
 use bisect::Partition;
-pub(crate) use climb::mutual_climb;
 use kernels::Kernels;
 use leaves::Leaves;
 pub(crate) use mutual::{Rows, mutual_nearest, squared_norms};

@@ -73,6 +73,12 @@ impl Rows {
         self.entries.rows()
     }
 
+    /// Some of the rows, in this order.
+    pub(super) fn select(&self, rows: &[u32]) -> Self {
+        let half_squares = rows.iter().map(|&i| self.half_squares[i as usize]).collect();
+        Self::new(self.entries.select_rows(rows), half_squares)
+    }
+
     pub(super) fn row(&self, i: usize) -> &[f32] {
         self.entries.row(i)
     }

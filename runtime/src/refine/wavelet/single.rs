@@ -26,10 +26,14 @@ struct Single {
 }
 
 impl Single {
-    fn new(basis: &Eigenbasis, anchors: Option<&Matrix>) -> Self {
-        let single = |matrix: &Matrix| matrix.map(|x| x as f32);
-        let (phi, mass) = (single(&basis.eigenvectors), basis.mass.iter().map(|&x| x as f32).collect());
-        let anchors = anchors.map_or(Matrix::zeros(basis.n(), 0), single);
+    fn new(basis: &Eigenbasis, k: usize, anchors: Option<&Matrix>) -> Self {
+        let single = |matrix: &Matrix, cols: usize| {
+            let mut data = Vec::with_capacity(matrix.rows() * cols);
+            (0..matrix.rows()).for_each(|i| data.extend(matrix.row(i)[..cols].iter().map(|&x| x as f32)));
+            Matrix::from_vec(matrix.rows(), cols, data)
+        };
+        let (phi, mass) = (single(&basis.eigenvectors, k), basis.mass.iter().map(|&x| x as f32).collect());
+        let anchors = anchors.map_or(Matrix::zeros(basis.n(), 0), |anchors| single(anchors, anchors.cols()));
         let half_squares =
             (0..basis.n()).map(|i| half_square(phi.row(i)) + half_square(anchors.row(i))).collect();
         Self { phi, mass, anchors, half_squares }
@@ -63,23 +67,23 @@ impl Single {
 
     /// Rows with the anchors beside them, whose squared norms are those of the shape's rows in the embedding.
     fn rows(&self, left: &Matrix<f32>, image: &Matrix<f32>) -> Rows {
-        let rows = (0..self.n()).flat_map(|i| left.row(i).iter().chain(self.anchors.row(i)).copied());
-        let entries = Matrix::from_vec(self.n(), left.cols() + self.anchors.cols(), rows.collect());
+        let entries = Matrix::beside(&[left, &self.anchors]);
         let half_squares = (0..self.n()).map(|i| self.half_squares[i] + half_square(image.row(i)));
         Rows::new(entries, half_squares.collect())
     }
 }
 
 impl SingleRounds {
-    /// Of bases of as many eigenfunctions, with the mask of their functional maps, `[k, k]`, and columns beside the embedding.
+    /// Of the first `k` eigenfunctions, with the mask of their functional maps, `[k, k]`, and columns beside the embedding.
     pub(super) fn new(
-        [source, target]: &[Eigenbasis; 2],
+        [source, target]: [&Eigenbasis; 2],
+        k: usize,
         mask: &Matrix,
         anchors: Option<&[Matrix; 2]>,
     ) -> Self {
         let shapes = [
-            Single::new(source, anchors.map(|[of_source, _]| of_source)),
-            Single::new(target, anchors.map(|[_, of_target]| of_target)),
+            Single::new(source, k, anchors.map(|[of_source, _]| of_source)),
+            Single::new(target, k, anchors.map(|[_, of_target]| of_target)),
         ];
         Self { shapes, mask: mask.map(|x| x as f32) }
     }
