@@ -4,25 +4,29 @@
     python runtime/benches/compare.py              # all of it: docs/benchmarks.md and docs/benchmarks/*.svg
     python runtime/benches/compare.py --quick --out /tmp/benchmarks
 
-It builds the programs and the benches, gets the peers' packages from PyPI (pinned, in an environment of its own beside the
-build), runs each bench and its peer on the same data, and runs `fmnet-infer match` as a user would, cold and with a cache, from
-1K to 200K vertices. A peer that cannot be installed is skipped, and the page says so. Where a peer's result differs from ours,
-or a program of ours fails, the exit status is 1.
+It builds the programs and the benches, runs each bench and its peer on the same data, runs `fmnet-infer match` as a user would,
+cold and with a cache, from 1K to 1M vertices, and `fmnet-infer batch` on all pairs of twenty shapes. The peers run in the
+Python that runs this: `pip install -r runtime/benches/peers/requirements.txt` installs them, and PyTorch is used where it is
+there. A peer that is not installed is skipped, and the page says so. Where a peer's result differs from ours, or a program of
+ours fails, the exit status is 1.
 
-Needs Rust and Python with venv (3.11 or newer for the pinned packages), Linux or macOS, about 8 GB of memory, and no research
-data. On 2 cores it takes about 20 minutes; nothing else should run meanwhile.
+Needs Rust and Python 3.9 or newer (3.11 for the pinned packages), Linux or macOS, about 8 GB of memory, and no research data. On
+2 cores it takes about 20 minutes after the build; nothing else should run meanwhile.
 """
 
 import argparse
 import pathlib
+import shutil
 import signal
 import sys
 import tempfile
 import time
 
-from comparison import environment, matching, page, stages
+from comparison import environment, matching, page, sizes, stages
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+#: What measures the stages that are no bench.
+MEASURES = {"match": matching.measure, "batch": matching.measure_batch, "size": sizes.measure}
 
 
 def arguments():
@@ -40,7 +44,7 @@ def arguments():
     parser.add_argument(
         "--quick", action="store_true", help="small sizes and one repetition, about 2 minutes: to see that it works"
     )
-    parser.add_argument("--no-peers", action="store_true", help="measure fmnet alone and install nothing")
+    parser.add_argument("--no-peers", action="store_true", help="measure fmnet alone")
     parser.add_argument("--dry-run", action="store_true", help="print the commands, run nothing")
     chosen = parser.parse_args()
     unknown = [name for name in chosen.only if name not in stages.NAMES]
@@ -57,14 +61,16 @@ def main():
     run = environment.Run(ROOT, chosen.quick, chosen.dry_run)
     run.build()
     if not chosen.no_peers:
-        run.prepare_peers()
+        run.find_peers()
     figures = []
     with tempfile.TemporaryDirectory(prefix="fmnet-benchmarks-") as scratch:
         for name in chosen.only:
             folder = pathlib.Path(scratch) / name
             folder.mkdir()
-            measure = matching.measure if name == "match" else stages.measure
-            figures += measure(run, name, folder)
+            begun = time.monotonic()
+            figures += MEASURES.get(name, stages.measure)(run, name, folder)
+            shutil.rmtree(folder, ignore_errors=True)
+            print(f"{name}: {time.monotonic() - begun:.0f} s", file=sys.stderr)
     if chosen.dry_run:
         return 0
     page.write(chosen.out, figures, run)
@@ -72,6 +78,8 @@ def main():
     for figure in disagreeing:
         print(f"DISAGREES: {figure['case']} with {figure['peer']}: {figure['agreement']}", file=sys.stderr)
     print(f"{chosen.out / 'benchmarks.md'} written; {time.monotonic() - started:.0f} s")
+    for line in page.summary(figures, run):
+        print(line)
     return 1 if disagreeing or run.failed else 0
 
 

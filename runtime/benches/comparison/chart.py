@@ -97,6 +97,8 @@ def spread(labels):
 
 
 def short(value):
+    if value >= 1e6:
+        return f"{value / 1e6:g}M"
     return f"{value / 1000:g}K" if value >= 1000 else f"{value:g}"
 
 

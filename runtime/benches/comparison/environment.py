@@ -1,5 +1,7 @@
-"""Building, the peers' packages, running a command and saying what it cost, and what machine this is."""
+"""Building, the peers, running a command and saying what it cost, and what machine this is."""
 
+import importlib.metadata
+import importlib.util
 import json
 import os
 import pathlib
@@ -14,7 +16,7 @@ PEERS = pathlib.Path("runtime/benches/peers")
 
 
 class Run:
-    """One run of the comparison: the programs built, the Python with the peers' packages, what was skipped and what failed."""
+    """One run of the comparison: the programs built, the Python of the peers, what was skipped and what failed."""
 
     def __init__(self, root, quick, dry_run):
         self.root = root
@@ -47,42 +49,12 @@ class Run:
     def program(self, name):
         return self.executables.get(name, name)
 
-    def prepare_peers(self):
-        """An environment with the pinned packages beside the build, made once; what cannot be installed is left out."""
-        requirements = self.root / PEERS / "requirements.txt"
-        if self.dry_run:
-            print(f"python3 -m venv ENVIRONMENT && ENVIRONMENT/bin/pip install -r {requirements.relative_to(self.root)}")
-            self.python = "ENVIRONMENT/bin/python"
+    def find_peers(self):
+        """The peers run in the Python that runs this, and each skips what is not installed there."""
+        if importlib.util.find_spec("numpy") is None and not self.dry_run:
+            self.skip(f"all peers: NumPy is not installed; pip install -r {PEERS / 'requirements.txt'}")
             return
-        metadata = ["cargo", "metadata", "--format-version", "1", "--no-deps"]
-        target = json.loads(subprocess.check_output(metadata, cwd=self.root))["target_directory"]
-        folder = pathlib.Path(target) / "environments" / "peers"
-        python = folder / "bin" / "python"
-        wanted = requirements.read_text()
-        marker = folder / "prepared"
-        if not marker.exists() or marker.read_text() != wanted:
-            print(f"installing the peers into {folder}", file=sys.stderr)
-            made = subprocess.run([sys.executable, "-m", "venv", folder], capture_output=True, text=True)
-            if made.returncode != 0:
-                self.skip(f"all peers: no virtual environment can be made ({last_line(made)})")
-                return
-            if self.install(python, wanted.split()):
-                marker.write_text(wanted)
-        if subprocess.run([python, "-c", "import numpy"], capture_output=True).returncode != 0:
-            self.skip("all peers: NumPy could not be installed")
-            return
-        self.python = str(python)
-
-    def install(self, python, packages):
-        """Installs all at once, else one after another; whether all are there."""
-        pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--prefer-binary"]
-        if subprocess.run([*pip, *packages], capture_output=True).returncode == 0:
-            return True
-        for package in packages:
-            tried = subprocess.run([*pip, package], capture_output=True, text=True)
-            if tried.returncode != 0:
-                self.skip(f"{package}: pip cannot install it ({last_line(tried)})")
-        return False
+        self.python = sys.executable
 
     def skip(self, reason):
         if reason not in self.skipped:
@@ -135,9 +107,8 @@ class Run:
         """Cores, processor, memory and versions; nothing that names the machine."""
         versions = [subprocess.check_output(["rustc", "--version"], text=True).split(" (")[0]]
         if self.python:
-            listed = subprocess.check_output([self.python, "-m", "pip", "list", "--format", "json"], text=True)
-            wanted = {line.split("==")[0].lower() for line in (self.root / PEERS / "requirements.txt").read_text().split()}
-            versions += [f"{p['name']} {p['version']}" for p in json.loads(listed) if p["name"].lower() in wanted]
+            requirements = (self.root / PEERS / "requirements.txt").read_text().split()
+            versions += [f"{name} {version}" for name in map(name_of, [*requirements, "torch"]) if (version := installed(name))]
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
         return f"{self.cores} cores, {processor()}, {memory:.0f} GB of memory, {platform.system()}; {', '.join(versions)}"
 
@@ -150,6 +121,13 @@ def processor():
         return platform.processor() or platform.machine()
 
 
-def last_line(process):
-    lines = process.stderr.strip().splitlines()
-    return lines[-1] if lines else f"exit status {process.returncode}"
+def name_of(requirement):
+    return requirement.split("==")[0]
+
+
+def installed(name):
+    """The version of a package, None where it is not installed."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

@@ -1,10 +1,14 @@
 """The page with the tables, and the plots."""
 
 import json
+import textwrap
 
-from . import chart, stages
+from . import chart, environment, stages
 
-COMMAND = "python runtime/benches/compare.py"
+COMMAND = ["pip install -r runtime/benches/peers/requirements.txt", "python runtime/benches/compare.py"]
+WIDTH = 118
+#: Lines that begin so are no prose, and stay as they are.
+NOT_PROSE = ("|", "#", "!", "- ")
 
 
 def write(out, figures, run):
@@ -15,15 +19,21 @@ def write(out, figures, run):
     for name, content in plots.items():
         (folder / f"{name}.svg").write_text(content)
     (folder / "figures.json").write_text(json.dumps(figures, indent=1) + "\n")
-    (out / "benchmarks.md").write_text("\n".join(page(figures, run, plots)) + "\n")
+    (out / "benchmarks.md").write_text("\n".join(map(wrapped, page(figures, run, plots))) + "\n")
+
+
+def wrapped(line):
+    if line.startswith(NOT_PROSE):
+        return line
+    return "\n".join(textwrap.wrap(line, WIDTH, break_long_words=False, break_on_hyphens=False))
 
 
 def page(figures, run, plots):
     quick = ["This was a trial run with `--quick`: one repetition, small sizes.", ""] if run.quick else []
     lines = [
         "# Benchmarks", "",
-        "Every figure on this page was measured in one run of one command, ours and the peers' on the same data:", "",
-        "```sh", COMMAND, "```", "",
+        "Every figure on this page was measured in one run of one command, the second of these, ours and the peers' on the same data:", "",
+        "```sh", *COMMAND, "```", "",
         "`--help` explains its options. Seconds are wall-clock, the least of several runs where a run is short; memory is the largest resident "
         "size of the process, which includes the inputs; 1 MB is 10^6 bytes. The ratio is ours over the peer's: below 1 ours is faster. The last column "
         "of a table says how far the two results agree.", "",
@@ -35,7 +45,10 @@ def page(figures, run, plots):
     for heading, reasons in (("Skipped:", run.skipped), ("Failed:", run.failed)):
         if reasons:
             lines += [heading, "", *[f"- {reason}" for reason in reasons], ""]
-    lines += matching(figures, plots)
+    short = summary(figures, run)
+    if short:
+        lines += ["## In short", "", *short, ""]
+    lines += matching(figures, plots) + batches(figures) + sizes_of_files(figures)
     for name, stage in stages.BENCHES.items():
         chosen = [figure for figure in figures if figure["bench"] == name]
         if chosen:
@@ -48,19 +61,21 @@ def page(figures, run, plots):
 def matching(figures, plots):
     """The sections of `fmnet-infer match`: whole pairs, then each stage of the cold ones."""
     pairs = [figure for figure in figures if figure["bench"] == "match" and "state" in figure]
-    starts = [figure for figure in figures if figure["case"] == "start"]
     lines = []
     if pairs:
         lines = ["## A pair, from files to the map", ""]
         lines += [
-            "`fmnet-infer match source.ply target.ply -o map.txt`, with its defaults, as a process of its own: reading, all stages, ZoomOut, writing. "
-            "Two generated people in different poses, each triangulated on its own; what has more than 15000 vertices is decimated, matched "
-            "and upscaled. Cached: with `--cache DIR` and both shapes in it.", "",
+            "`fmnet-infer match source.ply target.ply -o map.txt`, with its defaults, as a process of its own: reading, all stages, writing. Two "
+            "generated people in different poses, each triangulated on its own; what has more than 15000 vertices is decimated, matched and "
+            "taken to the full meshes. Cached: with `--cache DIR` and both shapes in it.", "",
         ]  # fmt: skip
         lines += table(
             ["vertices", "cold s", "CPU s", "MB", "cached s", "CPU s", "MB"],
             [[number(n), *costs(pairs, n, "cold"), *costs(pairs, n, "cached")] for n in sizes(pairs)],
         )
+        doubtful = sorted({number(figure["vertices"]) for figure in pairs if figure["ways"] > 1}, key=int)
+        if doubtful:
+            lines += ["", f"The first map of {', '.join(doubtful)} vertices was doubtful; the seconds are those of all ways that were tried."]
         lines += ["", *picture(plots, "match", "Seconds of a pair over the number of vertices")]
         lines += picture(plots, "memory", "Peak memory over the number of vertices")
         cold = {figure["vertices"]: figure["stages"] for figure in pairs if figure["state"] == "cold"}
@@ -71,9 +86,62 @@ def matching(figures, plots):
         rows = [[name, *[seconds(cold[n].get(name)) for n in cold]] for name in names]
         lines += table(["stage", *[chart.short(n) for n in cold]], rows)
         lines += ["", *picture(plots, "stages", "Seconds of every stage over the number of vertices")]
-    for figure in starts:
-        lines += [f"The program is {figure['bytes'] / 1e6:.1f} MB large and takes {1e3 * figure['seconds']:.1f} ms to start.", ""]
     return lines
+
+
+def batches(figures):
+    """All pairs of some shapes, by threads."""
+    found = [figure for figure in figures if figure["bench"] == "batch"]
+    if not found:
+        return []
+    shapes, pairs = found[0]["shapes"], found[0]["pairs"]
+    rows = [[str(f["threads"]), f"{f['pairs_per_second']:.3g}", seconds(f["seconds"]), memory(f)] for f in found]
+    return [
+        "## Many pairs", "",
+        f"`fmnet-infer batch pairs.txt --out maps --effort low`: all {pairs} pairs of {shapes} generated people of 2000 vertices, from "
+        "files to maps, nothing cached before.", "",
+        *table(["threads", "pairs a second", "s", "MB"], rows), "",
+    ]  # fmt: skip
+
+
+def sizes_of_files(figures):
+    """What users fetch, and how long it takes to start."""
+    names = {
+        "fmnet-infer": "the program `fmnet-infer`; start", "fmnet-train": "the program `fmnet-train`; start",
+        "wheel": "the Python wheel; `import fmnet`", "page": "the page in the browser, without its examples, not compressed",
+    }  # fmt: skip
+    found = [figure for figure in figures if figure["bench"] == "size"]
+    if not found:
+        return []
+    rows = [[names[f["case"]], f"{f['bytes'] / 1e6:.1f}", seconds(f.get("seconds"))] for f in found]
+    return ["## Sizes and starts", "", *table(["", "MB", "s"], rows), ""]
+
+
+def summary(figures, run):
+    """The sentence that the README has too, nothing where a size was not measured."""
+    pairs = {(f["state"], f["vertices"]): f for f in figures if f["bench"] == "match" and "state" in f}
+    wanted = [("cold", 6890), ("cached", 6890), ("cold", 200_000), ("cold", 1_000_000)]
+    if any(key not in pairs for key in wanted):
+        return []
+    small, cached, large, scan = (rounded(pairs[key]["seconds"]) for key in wanted)
+    of_large, of_scan = (rounded(pairs[key]["peak_mb"] / 1000) for key in wanted[2:])
+    return [
+        f"On {run.cores} cores ({plain(environment.processor())}) two people of 6890 vertices take {small} s from files to map, {cached} s "
+        f"with both shapes in the cache; two of 200000 vertices {large} s and {of_large} GB, two scans of a million {scan} s and "
+        f"{of_scan} GB."
+    ]
+
+
+def plain(processor):
+    """Its name without the marks of trade."""
+    for mark in ("(R)", "(TM)", " Processor"):
+        processor = processor.replace(mark, "")
+    return " ".join(processor.split())
+
+
+def rounded(value):
+    """Two significant digits."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.1f}" if value >= 1 else f"{value:.2f}"
 
 
 def comparison(figures):
@@ -130,8 +198,6 @@ def what(figure):
         return f"k = {figure['k']}"
     if bench == "nearest":
         return f"k = {figure['k']}, {'noisy' if figure['noise'] else 'no noise'}"
-    if bench == "step":
-        return f"{' '.join(rest)}, {figure['points']} points"
     words = [word for word in rest if word != str(figure.get("vertices"))]
     return " ".join(words) or bench
 

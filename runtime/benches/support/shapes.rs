@@ -19,19 +19,20 @@ pub(crate) fn bumpy_torus(ring: usize, tube: usize) -> Mesh {
     Mesh::new(vertices, torus.faces().to_vec()).expect("the faces are those of the torus")
 }
 
-/// Source and target: the two people of the demo, closed, of exactly `n` vertices each and triangulated on their
-/// own.
+/// Source and target: the two people of the demo, of exactly `n` vertices each and triangulated on their own.
 pub(crate) fn bodies(n: usize) -> [Mesh; 2] {
-    let mut seed = 0;
-    [demo_body("source"), demo_body("target")].map(|mut mesh| {
-        while 4 * mesh.n_vertices() < 5 * n {
-            mesh = shapes::subdivide(&mesh);
-        }
-        seed += 1;
-        // Without the displacement the faces of a subdivided triangle are coplanar, as those of no scan are.
-        let dense = displaced(mesh, seed);
-        decimate(&dense, n, &DecimateOptions::default()).expect("bodies are manifold").mesh
-    })
+    [body("source", n, 1), body("target", n, 2)]
+}
+
+/// The `source` or the `target` of the demo, closed, of exactly `n` vertices; the seed decides the triangulation.
+pub(crate) fn body(name: &str, n: usize, seed: u64) -> Mesh {
+    let mut mesh = demo_body(name);
+    while 4 * mesh.n_vertices() < 5 * n {
+        mesh = shapes::subdivide(&mesh);
+    }
+    // Without the displacement the faces of a subdivided triangle are coplanar, as those of no scan are.
+    let dense = displaced(mesh, seed);
+    decimate(&dense, n, &DecimateOptions::default()).expect("bodies are manifold").mesh
 }
 
 /// The `source` or the `target` of the demo.
