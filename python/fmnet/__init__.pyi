@@ -145,7 +145,7 @@ class Matcher:
         subdivide: _Vertices | None = None,
         shot_radius: float | None = None,
         cache: _Path | None = None,
-        backend: _Backend = "tract",
+        backend: _Backend = "native",
     ) -> Matcher: ...
     @property
     def k(self) -> int: ...
@@ -190,7 +190,7 @@ def match(
     subdivide: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
-    backend: _Backend = "tract",
+    backend: _Backend = "native",
 ) -> Match: ...
 def features(
     mesh: _Mesh,
@@ -202,7 +202,7 @@ def features(
     decimate: _Vertices | None = None,
     shot_radius: float | None = None,
     cache: _Path | None = None,
-    backend: _Backend = "tract",
+    backend: _Backend = "native",
 ) -> dict[str, NDArray[Any]]: ...
 def eigenbasis(mesh: _Mesh, k: int, *, unit_area: bool = True) -> Eigenbasis: ...
 def shot(

@@ -41,7 +41,7 @@ struct Found {
 ///     [n, k]; ``descriptors`` [n, d], or ``shot`` [n, 352]; ``vertices`` [n]: the mesh's vertex of each row.
 #[pyfunction]
 #[pyo3(signature = (mesh, *, progress=None, model=None, descriptor="learned", k=None, decimate=None, shot_radius=None, cache=None,
-                    backend="tract"))]
+                    backend="native"))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn features<'py>(
     py: Python<'py>,

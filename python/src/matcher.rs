@@ -47,7 +47,7 @@ use std::sync::Arc;
 ///     SHOT radius relative to sqrt(area), between 0 and 1. Default: the model's; 0.067 with SHOT.
 /// cache : path-like, optional
 ///     Folder in which what is computed of each shape is kept and found again.
-/// backend : {"tract", "native"}
+/// backend : {"native", "tract"}
 ///     What computes the network.
 ///
 /// Notes
@@ -70,7 +70,7 @@ impl Matcher {
     #[new]
     #[pyo3(signature = (model=None, *, descriptor="learned", k=None, fm=None, mask_weight=None, refine=None, upscale="surface",
                         effort="normal", adapt=None, decimate=None, subdivide=None, shot_radius=None, cache=None,
-                        backend="tract"))]
+                        backend="native"))]
     #[allow(clippy::too_many_arguments, reason = "they are keywords")]
     fn new(
         py: Python<'_>,
@@ -276,7 +276,7 @@ impl Matcher {
 #[pyfunction]
 #[pyo3(name = "match", signature = (source, target, *, partial=false, landmarks=None, progress=None, model=None, descriptor="learned", k=None, fm=None,
                     mask_weight=None, refine=None, upscale="surface", effort="normal", adapt=None, decimate=None, subdivide=None, shot_radius=None, cache=None,
-                        backend="tract"))]
+                        backend="native"))]
 #[allow(clippy::too_many_arguments, reason = "they are keywords")]
 pub(crate) fn match_(
     py: Python<'_>,

@@ -9,6 +9,9 @@ use crate::point_map::PointMap;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// Raised with every change by which the same meshes, model and options give another map within a version of the library.
+const REVISION: u8 = 1;
+
 /// Keys of maps: hashes of both meshes, the model, every option and the version of the library.
 #[derive(Clone, Debug)]
 pub struct MapKeys {
@@ -25,6 +28,7 @@ impl MapKeys {
         let model = matcher.network().map_or(&[][..], |network| &network.fingerprint()[..]);
         let settings = CacheKey::of(&[
             env!("CARGO_PKG_VERSION").as_bytes(),
+            &[REVISION],
             format!("{options:?}").as_bytes(),
             model,
             &[u8::from(partial)],

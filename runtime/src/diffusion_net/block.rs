@@ -1,6 +1,6 @@
 //! The parameters of a block, as views into the flat vector, and what is derived from them.
 
-use super::MIN_TIME;
+use super::{LEAST_EXPONENT, MIN_TIME};
 use crate::numeric::{MatrixView, Real, matmul, vectorized};
 
 /// A linear layer `x W + b`.
@@ -94,7 +94,8 @@ impl<'a, T: Real> Block<'a, T> {
         let times: Vec<f64> = self.time.iter().map(|t| t.to_double().max(MIN_TIME)).collect();
         let row = |lambda: &T| {
             let lambda = lambda.to_double();
-            times.iter().map(move |t| T::from_double((-lambda * t).exp())).collect::<Vec<T>>()
+            let decay = move |t: &f64| T::from_double((-lambda * t).max(LEAST_EXPONENT).exp());
+            times.iter().map(decay).collect::<Vec<T>>()
         };
         eigenvalues.iter().flat_map(row).collect()
     }

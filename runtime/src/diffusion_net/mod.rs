@@ -39,6 +39,9 @@ const CHUNK: usize = 256;
 const PIECES: usize = 4;
 /// Shorter diffusion times count as this.
 pub const MIN_TIME: f64 = 1e-8;
+/// A lower `-lambda t` counts as this. What it leaves of a frequency, `4e-18`, is nothing; less would become subnormal in single
+/// precision, with which processors take several times as long.
+pub const LEAST_EXPONENT: f64 = -40.0;
 
 /// The sizes of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -151,3 +151,18 @@ fn arrays_that_do_not_fit_are_named() {
     let error = forward(&setup.architecture, &setup.parameters[1..], &setup.input, &setup.operators, false);
     assert!(error.err().unwrap().contains("parameters, expected"));
 }
+
+/// Long diffusion times leave no subnormal numbers, with which processors are slow.
+#[test]
+fn what_long_times_leave_is_normal_in_single_precision() {
+    let Setup { architecture, mut parameters, operators, .. } = setup();
+    for parameter in architecture.parameters().iter().filter(|p| p.name.ends_with("time")) {
+        parameters[parameter.offset..parameter.offset + parameter.len()].fill(50.0);
+    }
+    let parameters: Vec<f32> = parameters.iter().map(|&x| x as f32).collect();
+    let mut rest = &parameters[architecture.inputs * architecture.width + architecture.width..];
+    let block = block::Block::take(&mut rest, architecture.width);
+    let decay = block.decay(&operators.cast::<f32>().eigenvalues);
+    assert_eq!(decay[..architecture.width], [1.0; 4]);
+    assert!(decay.iter().all(|x| x.is_normal()) && decay.last().is_some_and(|&x| x < 1e-17));
+}

@@ -27,12 +27,12 @@ use thiserror::Error;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Backend {
-    /// tract, pure Rust, built in.
+    /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train` writes, with the
+    /// weights of the file; tract for all other models.
     #[default]
-    Tract,
-    /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train` writes; tract for
-    /// all other models.
     Native,
+    /// tract, pure Rust, built in.
+    Tract,
     /// onnxruntime, its library, named by ORT_DYLIB_PATH, loaded at run time; needs the feature `ort`.
     Ort,
 }

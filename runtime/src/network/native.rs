@@ -106,7 +106,9 @@ impl NativeNetwork {
         let required = |quantity| of(quantity).expect("the network was read with this input");
         let (vectors, pairs) = required(Quantity::Eigenvectors);
         let first = |count: usize| -> Vec<f32> {
-            (0..n).flat_map(|i| &vectors[i * pairs..i * pairs + count]).copied().collect()
+            let mut columns = Vec::with_capacity(n * count);
+            (0..n).for_each(|i| columns.extend_from_slice(&vectors[i * pairs..i * pairs + count]));
+            columns
         };
         let eigenvalues = required(Quantity::Eigenvalues).0;
         let operators = Operators {
@@ -125,9 +127,9 @@ impl NativeNetwork {
         let shot = of(Quantity::Shot);
         let mut features = Vec::with_capacity(n * self.architecture.inputs);
         for i in 0..n {
-            features.extend(signature.row(i));
+            features.extend_from_slice(signature.row(i));
             if let Some((shot, width)) = shot {
-                features.extend(&shot[i * width..(i + 1) * width]);
+                features.extend_from_slice(&shot[i * width..(i + 1) * width]);
             }
         }
         NativeInput { features, operators }

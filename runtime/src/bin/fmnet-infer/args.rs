@@ -61,7 +61,7 @@ pub(crate) struct ShapeArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) model: Option<PathBuf>,
     /// What computes the network
-    #[arg(long, value_enum, default_value = "tract")]
+    #[arg(long, value_enum, default_value = "native")]
     pub(crate) backend: Backend,
     /// Learned descriptors, or SHOT without a network (the paper's baseline)
     #[arg(long, value_enum, default_value = "learned")]

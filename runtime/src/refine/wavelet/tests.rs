@@ -1,4 +1,5 @@
 use super::*;
+use crate::point_map::Comparison;
 use crate::fmap::test_basis::{assert_close, flipped, identity, rectangle, reordered, shuffle};
 
 /// The permutation that takes a shape to [`reordered`], and back.

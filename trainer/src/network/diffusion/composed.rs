@@ -2,7 +2,7 @@
 
 use crate::network::NetworkInput;
 use candle_core::{D, Result, Tensor};
-use fmnet::diffusion_net::{Architecture, MIN_TIME};
+use fmnet::diffusion_net::{Architecture, LEAST_EXPONENT, MIN_TIME};
 
 /// Descriptors `[n, outputs]` of a shape, with `parameters` flat, `[p]`, of the type that the work is done in.
 pub(super) fn forward(
@@ -24,7 +24,7 @@ pub(super) fn forward(
     for block in 0..architecture.blocks {
         let part = |name: &str| format!("blocks.{block}.{name}");
         let time = views.get(&part("time"))?.unsqueeze(0)?.maximum(MIN_TIME)?;
-        let decay = (eigenvalues.matmul(&time)? * -1.0)?.exp()?;
+        let decay = (eigenvalues.matmul(&time)? * -1.0)?.maximum(LEAST_EXPONENT)?.exp()?;
         let projected = eigenvectors.t()?.matmul(&x.broadcast_mul(&mass)?)?;
         let coefficients = (projected * decay)?;
         let diffused = eigenvectors.matmul(&coefficients)?;

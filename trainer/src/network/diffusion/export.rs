@@ -4,7 +4,7 @@
 
 use super::{DiffusionOptions, SHOT_WIDTH};
 use crate::export::{GraphBuilder, Parameters, axis, integer};
-use fmnet::diffusion_net::MIN_TIME;
+use fmnet::diffusion_net::{LEAST_EXPONENT, MIN_TIME};
 use fmnet::network::contract::Quantity;
 use fmnet::spectral::{WKS_HEADROOM, WKS_WIDTH, WKS_ZERO};
 
@@ -148,6 +148,8 @@ fn residual_block(
     let times: Vec<f32> = parameters.get(&part("time")).iter().map(|t| t.max(MIN_TIME as f32)).collect();
     let times = graph.constant(&part("time"), &[width, 1], &times);
     let exponent = plain(graph, "Mul", "exponent", [&times, &operators.decaying]);
+    let least = graph.constant(&part("least"), &[], &[LEAST_EXPONENT as f32]);
+    let exponent = plain(graph, "Max", "exponent.above", [&exponent, &least]);
     let decay = graph.node("Exp", &part("decay"), &[&exponent], Vec::new());
     let weighted = plain(graph, "Mul", "weighted", [x, &operators.mass]);
     let projected = plain(graph, "MatMul", "projected", [&weighted, &operators.eigenvectors]);
