@@ -10,6 +10,7 @@ use crate::mesh::{SurfacePoint, vertices_on_surface};
 use crate::point_map::PointMap;
 use crate::shape::{Shape, WayBack};
 use crate::spectral::Eigenbasis;
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// Times of the heat at unit area: from a hand to a limb.
@@ -45,6 +46,32 @@ pub enum LandmarkError {
         /// The vertex.
         vertex: u32,
     },
+    /// A source vertex has two images, and a map can keep only one.
+    #[error(
+        "landmarks {first} and {second} match source vertex {vertex} with different target vertices; keep one of them"
+    )]
+    TwoImages {
+        /// The one landmark, from 0.
+        first: usize,
+        /// The other.
+        second: usize,
+        /// The source vertex.
+        vertex: u32,
+    },
+}
+
+/// Refuses landmarks that contradict each other.
+fn check_images(pairs: &[(u32, u32)]) -> Result<(), LandmarkError> {
+    let mut known = BTreeMap::new();
+    for (second, &(vertex, image)) in pairs.iter().enumerate() {
+        match known.insert(vertex, (second, image)) {
+            Some((first, other)) if other != image => {
+                return Err(LandmarkError::TwoImages { first, second, vertex });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Landmarks of a pair, on the working meshes.
@@ -58,6 +85,7 @@ pub(super) struct Landmarks {
 impl Landmarks {
     /// Finds matches of the inputs' vertices on the working meshes.
     pub(super) fn new(pair: &Pair, pairs: &[(u32, u32)]) -> Result<Self, Error> {
+        check_images(pairs)?;
         let bases = pair.bases(pair.matcher.k)?;
         let shapes = [&pair.source.shape, &pair.target.shape];
         let mut warmth = Vec::with_capacity(2);
@@ -135,4 +163,17 @@ fn warmth(basis: &Eigenbasis, landmarks: &[u32]) -> Matrix {
 
 fn squares(matrix: &Matrix) -> f64 {
     matrix.data().iter().map(|x| x * x).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn landmarks_may_agree_but_not_contradict_each_other() {
+        assert_eq!(check_images(&[(3, 7), (4, 7), (3, 7)]), Ok(()));
+        let error = check_images(&[(3, 7), (5, 1), (3, 8)]).unwrap_err();
+        assert_eq!(error, LandmarkError::TwoImages { first: 0, second: 2, vertex: 3 });
+        assert!(error.to_string().starts_with("landmarks 0 and 2 match source vertex 3"));
+    }
 }

@@ -238,7 +238,9 @@ impl Pair<'_> {
         // Rows of a joint embedding at unit area have a squared length of about twice the eigenfunctions.
         let given = landmarks.map(|landmarks| landmarks.anchors(2.0 * self.refined_k() as f64));
         let columns = match (own, given) {
-            (Some(own), Some(given)) => [Matrix::beside(&[&own[0], &given[0]]), Matrix::beside(&[&own[1], &given[1]])],
+            (Some(own), Some(given)) => {
+                [Matrix::beside(&[&own[0], &given[0]]), Matrix::beside(&[&own[1], &given[1]])]
+            }
             (own, given) => own.or(given)?,
         };
         Some(Box::new(columns))
@@ -332,8 +334,12 @@ impl Pair<'_> {
                 100.0 * quality.reversed
             ));
         } else if estimate.doubtful {
+            let remedy = match self.is_part() {
+                true => "-k 50, --landmarks or a model that was trained on parts",
+                false => "--effort high, --landmarks or --adapt",
+            };
             self.warn(&format!(
-                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try --effort high, --landmarks or --adapt",
+                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
                 estimate.expected_error,
                 quality.complaint()
             ));

@@ -39,11 +39,7 @@ impl AlongEdges {
     ///
     /// # Errors
     /// If a set is empty, an entry is not finite, or the widths differ.
-    pub(crate) fn nearest(
-        &self,
-        [a, b]: [&Rows; 2],
-        guesses: Guesses,
-    ) -> Result<[Vec<u32>; 2], SearchError> {
+    pub(crate) fn nearest(&self, [a, b]: [&Rows; 2], guesses: Guesses) -> Result<[Vec<u32>; 2], SearchError> {
         check_pair([a, b])?;
         let [edges_a, edges_b] = &self.shapes;
         let (own, sampled) = match guesses {

@@ -1,6 +1,6 @@
 use super::*;
-use crate::point_map::Comparison;
 use crate::fmap::test_basis::{assert_close, flipped, identity, rectangle, reordered, shuffle};
+use crate::point_map::Comparison;
 
 /// The permutation that takes a shape to [`reordered`], and back.
 fn permutation(order: &[u32]) -> [PointMap; 2] {
