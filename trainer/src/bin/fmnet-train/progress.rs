@@ -111,10 +111,10 @@ impl Progress {
         let hard_error = 100.0 * Averages::add(&mut averages.hard_error, hard_error);
         let seconds = Averages::add(&mut averages.seconds, seconds);
         let left = (averages.steps.saturating_sub(step)) as f64 * seconds / 60.0;
-        let text = format!(
-            "loss {loss:.5}, error x 100 {hard_error:.2}, {:.2} steps/s, {left:.0} min left",
-            1.0 / seconds
-        );
+        // Some losses need no map, so that there is no error to tell.
+        let error =
+            if hard_error.is_nan() { String::new() } else { format!(", error x 100 {hard_error:.2}") };
+        let text = format!("loss {loss:.5}{error}, {:.2} steps/s, {left:.0} min left", 1.0 / seconds);
         match &self.bar {
             Some(bar) => {
                 bar.set_position(step);
