@@ -1,8 +1,10 @@
 //! Other ways to the map of a pair, tried where the first looks wrong; the best by its quality is taken.
 
 use super::adapt::adapted;
+use super::judge::Judge;
 use super::landmarks::Landmarks;
-use super::pair::{Found, Judge, Pair, of_length};
+use super::pair::{Pair, of_length};
+use super::refine::Found;
 use super::{Effort, Refinement};
 use crate::Matrix;
 use crate::error::Error;

@@ -16,9 +16,11 @@ mod describe_pair;
 mod described;
 mod descriptor;
 mod finish;
+mod judge;
 mod landmarks;
 mod options;
 mod pair;
+mod refine;
 
 use crate::cache::{Cache, CacheKey};
 use crate::descriptor::ShotOptions;

@@ -3,6 +3,7 @@
 use super::candidates::{Start, Tried};
 use super::finish::{full_by_functional_map, on_inputs};
 use super::landmarks::Landmarks;
+use super::refine::Found;
 use super::{DescribedShape, Match, Matcher, Refinement, Upscaling};
 use crate::Matrix;
 use crate::error::Error;
@@ -11,14 +12,8 @@ use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
 use crate::point_map::search::{AlongEdges, Guesses};
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
-use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
-use crate::refine::{
-    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf,
-    wavelet, zoomout,
-};
 use crate::shape::Context;
-use crate::spectral::{Eigenbasis, Laplacian};
-use std::sync::Arc;
+use crate::spectral::Eigenbasis;
 
 /// Length of the descriptors beside the rows of refinement's embeddings, whose squared length is about 400: on people and animals of
 /// other makers 7 to 14 give the same, 0 and 20 are worse.
@@ -31,53 +26,6 @@ pub(super) struct Pair<'a> {
     /// Both names, for messages.
     pub(super) names: &'a str,
     pub(super) context: Context<'a>,
-}
-
-/// A map between the working meshes, both ways where both are known.
-pub(super) struct Found {
-    pub(super) map: PointMap,
-    pub(super) back: Option<PointMap>,
-    /// The space that it was found in; none where it comes from no functional map.
-    pub(super) embedding: Option<Embedding>,
-    pub(super) pmf_info: Option<PmfInfo>,
-}
-
-impl Found {
-    fn in_embedding(map: PointMap, back: Option<PointMap>, embedding: Embedding) -> Self {
-        Self { map, back, embedding: Some(embedding), pmf_info: None }
-    }
-}
-
-/// What judges maps of a pair.
-pub(super) struct Judge<'a> {
-    pair: &'a Pair<'a>,
-    bases: [Eigenbasis; 2],
-    laplacians: [Arc<Laplacian>; 2],
-    frames: [SurfaceFrame; 2],
-}
-
-impl Judge<'_> {
-    fn sides(&self) -> [Side<'_>; 2] {
-        let shapes = [&self.pair.source.shape, &self.pair.target.shape];
-        std::array::from_fn(|i| Side {
-            mesh: shapes[i].mesh(),
-            laplacian: &self.laplacians[i],
-            basis: &self.bases[i],
-            frame: &self.frames[i],
-        })
-    }
-
-    /// The measures of a map and what they say of its error.
-    pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
-        let [source, target] = self.sides();
-        let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
-        Ok((quality, self.pair.matcher.calibration().estimate(&quality)))
-    }
-
-    fn doubt(&self, found: &Found) -> Vec<f32> {
-        let [source, target] = self.sides();
-        doubt(&found.map, found.back.as_ref(), source, target)
-    }
 }
 
 impl Pair<'_> {
@@ -244,106 +192,6 @@ impl Pair<'_> {
             (own, given) => own.or(given)?,
         };
         Some(Box::new(columns))
-    }
-
-    /// Refines a start up to [`Pair::refined_k`] eigenfunctions.
-    pub(super) fn refine(&self, refinement: Refinement, start: &Start) -> Result<Found, Error> {
-        match refinement {
-            Refinement::None => {
-                let (map, back) = (start.map.clone(), (!self.is_part()).then(|| start.back.clone()));
-                Ok(Found::in_embedding(map, back, start.embedding.clone()))
-            }
-            Refinement::Icp => self.icp(start),
-            Refinement::Zoomout => self.zoomout(start),
-            Refinement::Wavelet => self.wavelet(start),
-            Refinement::Pmf | Refinement::SharedTriangulation => {
-                self.product_manifold_filter(refinement, start)
-            }
-        }
-    }
-
-    fn icp(&self, start: &Start) -> Result<Found, Error> {
-        let [source, target] = self.bases(self.matcher.k)?;
-        let refine = || icp(&start.functional_map, &source, &target, &IcpOptions::default());
-        let refined = self.timed("icp", refine)?;
-        let embedding = Embedding::of_one(Comparison::Distance, &refined.functional_map, &source, &target)?;
-        Ok(Found::in_embedding(refined.map, None, embedding))
-    }
-
-    fn zoomout(&self, start: &Start) -> Result<Found, Error> {
-        let [source, target] = self.bases(self.refined_k())?;
-        let options = ZoomOutOptions { part: self.is_part(), ..ZoomOutOptions::default() };
-        let refined = self.timed("zoomout", || zoomout(&start.map, &source, &target, &options))?;
-        let c = &refined.functional_map;
-        // A part has fewer eigenfunctions.
-        let (source, target) = (source.truncated(c.cols()), target.truncated(c.rows()));
-        let embedding = Embedding::of_one(Comparison::Adjoint, c, &source, &target)?;
-        Ok(Found::in_embedding(refined.map, None, embedding))
-    }
-
-    fn wavelet(&self, start: &Start) -> Result<Found, Error> {
-        let k = self.refined_k();
-        let [source, target] = self.bases(k)?;
-        let options =
-            WaveletOptions { part: self.is_part(), ..WaveletOptions::coarse_to_fine(self.matcher.k, k) };
-        let hints = WaveletHints {
-            anchors: start.anchors.as_deref(),
-            meshes: Some([self.source.shape.mesh(), self.target.shape.mesh()]),
-        };
-        let maps = [&start.map, &start.back];
-        let refined = self.timed("wavelet", || wavelet(maps, &source, &target, hints, &options))?;
-        Ok(Found::in_embedding(refined.map, Some(refined.map_back), refined.embedding))
-    }
-
-    fn product_manifold_filter(&self, refinement: Refinement, start: &Start) -> Result<Found, Error> {
-        let start = self.zoomout(start)?.map;
-        let follows = refinement == Refinement::SharedTriangulation;
-        // SHOT tells neighbouring vertices apart; learned descriptors only have to span the right functions.
-        let shot = |described: &DescribedShape| described.shape.shot(&self.matcher.shot, self.context);
-        let (shot_source, shot_target) = (shot(self.source)?, shot(self.target)?);
-        let hints = PmfHints {
-            descriptors: Some([&shot_source, &shot_target]),
-            meshes: follows.then(|| [self.source.shape.mesh(), self.target.shape.mesh()]),
-        };
-        let [source, target] = self.bases(self.refined_k())?;
-        let options = PmfOptions { part: self.is_part(), ..PmfOptions::default() };
-        let filtered = self.timed("pmf", || pmf(&start, &source, &target, hints, &options))?;
-        if follows && filtered.info.edges_kept.is_none() {
-            self.warn(
-                "the meshes are not triangulated alike; the map is that of the product manifold filter",
-            );
-        }
-        Ok(Found { map: filtered.map, back: None, embedding: None, pmf_info: Some(filtered.info) })
-    }
-
-    fn judge(&self) -> Result<Judge<'_>, Error> {
-        let shapes = [&self.source.shape, &self.target.shape];
-        let k = SPECTRAL_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
-        Ok(Judge {
-            pair: self,
-            bases: self.bases(k)?,
-            laplacians: shapes.map(|shape| shape.laplacian()),
-            frames: shapes.map(|shape| SurfaceFrame::new(shape.mesh())),
-        })
-    }
-
-    fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate) {
-        if quality.is_mirrored() {
-            self.warn(&format!(
-                "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
-                100.0 * quality.reversed
-            ));
-        } else if estimate.doubtful {
-            let remedy = match self.is_part() {
-                true => "-k 50, --landmarks or a model that was trained on parts",
-                false => "--effort high, --landmarks or --adapt",
-            };
-            self.warn(&format!(
-                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
-                estimate.expected_error,
-                quality.complaint()
-            ));
-        }
     }
 
     /// From the working meshes to the inputs.

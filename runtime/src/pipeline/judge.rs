@@ -1,0 +1,72 @@
+//! How good the map of a pair is, and what is said of it.
+
+use super::pair::Pair;
+use super::refine::Found;
+use crate::error::Error;
+use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
+use crate::spectral::{Eigenbasis, Laplacian};
+use std::sync::Arc;
+
+/// What judges maps of a pair.
+pub(super) struct Judge<'a> {
+    pair: &'a Pair<'a>,
+    bases: [Eigenbasis; 2],
+    laplacians: [Arc<Laplacian>; 2],
+    frames: [SurfaceFrame; 2],
+}
+
+impl Judge<'_> {
+    fn sides(&self) -> [Side<'_>; 2] {
+        let shapes = [&self.pair.source.shape, &self.pair.target.shape];
+        std::array::from_fn(|i| Side {
+            mesh: shapes[i].mesh(),
+            laplacian: &self.laplacians[i],
+            basis: &self.bases[i],
+            frame: &self.frames[i],
+        })
+    }
+
+    /// The measures of a map and what they say of its error.
+    pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
+        let [source, target] = self.sides();
+        let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
+        Ok((quality, self.pair.matcher.calibration().estimate(&quality)))
+    }
+
+    pub(super) fn doubt(&self, found: &Found) -> Vec<f32> {
+        let [source, target] = self.sides();
+        doubt(&found.map, found.back.as_ref(), source, target)
+    }
+}
+
+impl Pair<'_> {
+    pub(super) fn judge(&self) -> Result<Judge<'_>, Error> {
+        let shapes = [&self.source.shape, &self.target.shape];
+        let k = SPECTRAL_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
+        Ok(Judge {
+            pair: self,
+            bases: self.bases(k)?,
+            laplacians: shapes.map(|shape| shape.laplacian()),
+            frames: shapes.map(|shape| SurfaceFrame::new(shape.mesh())),
+        })
+    }
+
+    pub(super) fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate) {
+        if quality.is_mirrored() {
+            self.warn(&format!(
+                "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
+                100.0 * quality.reversed
+            ));
+        } else if estimate.doubtful {
+            let remedy = match self.is_part() {
+                true => "a model that was trained on parts, --landmarks or -k 50",
+                false => "--effort high, --landmarks or --adapt",
+            };
+            self.warn(&format!(
+                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
+                estimate.expected_error,
+                quality.complaint()
+            ));
+        }
+    }
+}
