@@ -28,7 +28,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Backend {
     /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train` writes, with the
-    /// weights of the file, in a third of tract's time; tract for all other models.
+    /// weights of the file, in two thirds of tract's time; tract for all other models.
     #[default]
     Native,
     /// tract, pure Rust, built in.

@@ -108,8 +108,8 @@ pub struct RefinedBoth<Info> {
 /// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
 /// cosine of the angle between the two rows of the embedding.
 ///
-/// All rounds but the last are in single precision where the shapes are small, and distances are compared in it, as
-/// [`crate::point_map::Embedding::both`] does.
+/// With the meshes, or between small shapes, matches are found in single precision; the functional maps and the embedding that are
+/// returned are in double precision.
 ///
 /// # Errors
 /// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
