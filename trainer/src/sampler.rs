@@ -275,10 +275,13 @@ impl<'a> Sampler<'a> {
             source: error,
         };
         let [phi, psi] = &functions;
-        Ok([
-            fmnet::fmap::from_points(phi, psi).map_err(wrong)?,
-            fmnet::fmap::from_points(psi, phi).map_err(wrong)?,
-        ])
+        let forth = fmnet::fmap::from_points(phi, psi).map_err(wrong)?;
+        let back = match source.entry.is_part() {
+            // What lies outside the part says nothing of its functions: the restriction to the part, see `fmnet::fmap::part`.
+            true => forth.transposed(),
+            false => fmnet::fmap::from_points(psi, phi).map_err(wrong)?,
+        };
+        Ok([forth, back])
     }
 }
 
@@ -353,17 +356,15 @@ mod tests {
     use fmnet::cache::Cache;
     use fmnet::io::{Attributes, write_mesh};
     use fmnet::mesh::shapes::bumpy_sphere;
+    use std::path::Path;
 
-    #[test]
-    fn a_part_with_too_few_of_the_points_drawn_is_named() {
-        let folder = tempfile::tempdir().unwrap();
+    /// A sphere and, after it, its first 400 faces, which are a part of it.
+    fn whole_and_part(folder: &Path, config: &TrainConfig) -> [PreparedShape; 2] {
         let whole = bumpy_sphere(3, 1);
         let part = Mesh::new(whole.vertices().to_vec(), whole.faces()[..400].to_vec()).unwrap();
-        let loss = LossOptions::siamese();
-        let config = TrainConfig { k: 5, pool: 1000, loss, ..TrainConfig::paper() };
-        let cache = Cache::open(&folder.path().join("cache")).unwrap();
+        let cache = Cache::open(&folder.join("cache")).unwrap();
         let shape = |(name, mesh, is_part): (&str, &Mesh, bool)| {
-            let path = folder.path().join(format!("{name}.off"));
+            let path = folder.join(format!("{name}.off"));
             write_mesh(&path, mesh, &Attributes::default()).unwrap();
             let entry = ShapeEntry {
                 name: name.into(),
@@ -371,11 +372,43 @@ mod tests {
                 group: "sphere".into(),
                 correspondence: Correspondence::Identity,
                 split: Split::Train,
-                whole: is_part.then(|| folder.path().join("whole.off")),
+                whole: is_part.then(|| folder.join("whole.off")),
             };
-            prepare(&entry, &prepare_options(&config), 1, &cache, &fmnet::events::ignore).unwrap()
+            prepare(&entry, &prepare_options(config), 1, &cache, &fmnet::events::ignore).unwrap()
         };
-        let shapes = [("whole", &whole, false), ("part", &part, true)].map(shape);
+        [("whole", &whole, false), ("part", &part, true)].map(shape)
+    }
+
+    #[test]
+    fn functions_on_the_whole_go_to_their_restrictions_to_a_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let loss = LossOptions { spectral: 1.0, siamese: 1.0, ..LossOptions::none() };
+        let config = TrainConfig { k: 10, points: 500, pool: 1000, loss, ..TrainConfig::paper() };
+        let shapes = whole_and_part(folder.path(), &config);
+        let pair = Sampler::new(&shapes, &config).unwrap().batch(0).unwrap().remove(0);
+        let [_, back] = pair.ground_truth.unwrap();
+        let [whole, part] = [0, 1].map(|i| shapes[i].arrays().unwrap());
+        let shared: Vec<[usize; 2]> = std::iter::zip(&shapes[0].points, &shapes[1].points)
+            .filter(|(_, on_part)| **on_part != MISSING)
+            .map(|(&on_whole, &on_part)| [on_whole as usize, on_part as usize])
+            .collect();
+        let inner = |i: usize, j: usize| {
+            let term =
+                |&[w, p]: &[usize; 2]| part.mass[p] * part.eigenvectors[(p, i)] * whole.eigenvectors[(w, j)];
+            f64::from(shared.iter().map(term).sum::<f32>())
+        };
+        let restriction = Matrix::from_fn(10, 10, inner);
+        let norm = |matrix: &Matrix| matrix.data().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let difference = Matrix::from_fn(10, 10, |i, j| back[(i, j)] - restriction[(i, j)]);
+        assert!(norm(&difference) < 0.05 * norm(&restriction), "{difference:?}");
+    }
+
+    #[test]
+    fn a_part_with_too_few_of_the_points_drawn_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let loss = LossOptions::siamese();
+        let config = TrainConfig { k: 5, pool: 1000, loss, ..TrainConfig::paper() };
+        let shapes = whole_and_part(folder.path(), &config);
         let batch = |points: usize| {
             Sampler::new(&shapes, &TrainConfig { points, ..config.clone() }).unwrap().batch(0)
         };

@@ -10,6 +10,7 @@
 //!                                        # a .corr file: line i: 1-based triangle of point i and three weights, -1 where missing
 //! split = "train"                        # train | validation | test
 //! partial = false                        # a part of a whole: a source only
+//! whole = "horse/horse_03.ply"           # of a part: the mesh whose area is its unit; absent: the group's first whole
 //! ```
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split};
@@ -41,6 +42,8 @@ struct ManifestShape {
     split: Split,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     partial: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    whole: Option<String>,
 }
 
 /// Writes the manifest of shapes whose files are in `folder`. Their correspondences are files, or by vertices.
@@ -67,6 +70,8 @@ pub(crate) fn write(folder: &Path, shapes: &[ShapeEntry]) -> Result<(), DatasetE
             correspondence,
             split: shape.split,
             partial: shape.is_part(),
+            // Of one that is elsewhere, the group's first whole stands in.
+            whole: shape.whole.as_deref().and_then(|whole| relative(whole).ok()),
         })
     };
     let shape = shapes.iter().map(entry).collect::<Result<_, DatasetError>>()?;
@@ -103,7 +108,14 @@ pub(super) fn read(path: &Path) -> Result<Vec<ShapeEntry>, DatasetError> {
             Some(file) => Correspondence::Vts(folder.join(file)),
             None => Correspondence::Identity,
         };
-        let whole = if shape.partial { wholes.get(&shape.group).cloned() } else { None };
+        if shape.whole.is_some() && !shape.partial {
+            return Err(wrong(format!(
+                "{:?} has a whole, but is not partial; add partial = true",
+                shape.name
+            )));
+        }
+        let own = shape.whole.map(|whole| folder.join(whole));
+        let whole = if shape.partial { own.or_else(|| wholes.get(&shape.group).cloned()) } else { None };
         if shape.partial && whole.is_none() {
             return Err(wrong(format!(
                 "{:?} is partial, but its group {:?} has no whole shape",

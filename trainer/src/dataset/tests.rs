@@ -160,6 +160,8 @@ fn a_wrong_manifest_is_named() {
         ("format = 1\n".into(), "no [[shape]]"),
         (format!("format = 1\n{}", shape.replace("train", "training")), "training"),
         (format!("format = 1\n{}", shape.replace("group", "grup")), "grup"),
+        (format!("format = 1\n{shape}whole = \"b.off\"\n"), "add partial = true"),
+        (format!("format = 1\n{shape}partial = true\n"), "no whole shape"),
     ] {
         write(folder.path(), &[("dataset.toml", &text)]);
         let error = Dataset::open(folder.path()).unwrap_err().to_string();

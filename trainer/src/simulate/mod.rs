@@ -3,7 +3,7 @@
 //! - [`simulate_scan`] makes of a closed registration what a 3D scanner would have seen of it; [`write_scans`] a folder in the
 //!   layout of the FAUST scans.
 //! - [`cut_part`] cuts a part out of a shape; [`write_parts`] a folder in the layout of the SHREC'16 partial correspondence
-//!   benchmark (Cosmo et al. 2016).
+//!   benchmark (Cosmo et al. 2016), or one with a manifest where shapes do not share a triangulation.
 //! - [`triangulated`] gives a shape another triangulation, with correspondences that are points on its surface;
 //!   [`write_triangulations`] a folder with a manifest.
 //!
@@ -20,6 +20,7 @@ mod random;
 mod scan;
 mod scan_files;
 mod smooth;
+mod surface_part_files;
 #[cfg(test)]
 mod tests;
 mod triangulation;

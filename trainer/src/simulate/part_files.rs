@@ -1,6 +1,7 @@
 //! Parts in the layout of SHREC'16: `null/CLASS.off`, `holes/holes_CLASS_shape_N.off` with `.baryc_gt`, likewise `cuts`.
 
 use super::folder::{claim, save};
+use super::surface_part_files::write_surface_parts;
 use super::{Part, PartKind, PartOptions, SimulateError, SimulateProgress, cut_part};
 use crate::dataset::{Correspondence, Dataset, ShapeEntry, TRAINING_PARTS};
 use fmnet::Mesh;
@@ -20,11 +21,12 @@ struct Job<'a> {
     whole: &'a ShapeEntry,
 }
 
-/// Writes parts of every class of the dataset, and says how many there are.
+/// Writes parts of the shapes of a dataset, and says how many there are.
 ///
-/// Each group is a class, with at least three shapes in vertex to vertex correspondence, as in TOSCA: the first by name is
+/// Where shapes share a triangulation, in the layout of SHREC'16: each group is a class, with at least three shapes in vertex to vertex correspondence, as in TOSCA: the first by name is
 /// the whole, in its pose; the first half of the others gives the 10 training parts, which come first, and the second half the
-/// test parts, so that these share neither pose nor cut with the training parts.
+/// test parts, so that these share neither pose nor cut with the training parts. Other shapes are written as they are with a part of
+/// each kind beside them, `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and a manifest that keeps groups and splits.
 ///
 /// # Errors
 /// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be read or
@@ -36,6 +38,9 @@ pub fn write_parts(
     progress: SimulateProgress,
 ) -> Result<usize, SimulateError> {
     options.check()?;
+    if dataset.shapes.iter().any(|shape| shape.correspondence != Correspondence::Identity) {
+        return write_surface_parts(dataset, out, options, progress);
+    }
     let jobs = jobs(dataset, options)?;
     let folders: Vec<&str> = options.kinds.iter().map(|k| k.name()).chain(["null"]).collect();
     claim(out, &folders, "parts", &dataset.folder, options)?;
@@ -70,12 +75,6 @@ pub fn write_parts(
 /// All parts, those of one class together.
 fn jobs<'a>(dataset: &'a Dataset, options: &PartOptions) -> Result<Vec<Job<'a>>, SimulateError> {
     let unfit = |reason: String| SimulateError::Unfit { folder: dataset.folder.clone(), reason };
-    if let Some(other) = dataset.shapes.iter().find(|s| s.correspondence != Correspondence::Identity) {
-        return Err(unfit(format!(
-            "{} does not correspond with the others vertex by vertex; choose a dataset like TOSCA",
-            other.name
-        )));
-    }
     let mut classes: Vec<&str> = dataset.shapes.iter().map(|s| s.group.as_str()).collect();
     classes.sort_unstable();
     classes.dedup();

@@ -1,7 +1,7 @@
 //! Simulated scans and parts on small closed shapes.
 
 use super::*;
-use crate::dataset::{Dataset, MISSING, Split};
+use crate::dataset::{Dataset, MISSING, ShapeEntry, Split};
 use fmnet::Mesh;
 use fmnet::io::{Attributes, write_mesh};
 use fmnet::mesh::shapes::{bumpy_sphere, open_half_sphere, transformed};
@@ -228,6 +228,41 @@ fn written_parts_are_read_as_shrec16() {
     let few = Dataset::open(few.path()).unwrap();
     let error = write_parts(&few, &out.path().join("few"), &options, &quiet).unwrap_err();
     assert!(error.to_string().contains("class cat has 2 shapes"), "{error}");
+}
+
+#[test]
+fn parts_of_other_triangulations_keep_the_points_that_they_have() {
+    let data = folder_of(&["cat0.off", "cat4.off"]);
+    let (triangulated, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let splits = [Split::Train, Split::Validation];
+    let dataset = Dataset::open(data.path()).unwrap();
+    write_triangulations(&dataset, &splits, triangulated.path(), &triangulation_options(), &quiet).unwrap();
+    let dataset = Dataset::open(triangulated.path()).unwrap();
+    assert_eq!(write_parts(&dataset, out.path(), &PartOptions::default(), &quiet).unwrap(), 4);
+    let written = Dataset::open(out.path()).unwrap();
+    let names: Vec<&str> = written.shapes.iter().map(|shape| shape.name.as_str()).collect();
+    assert_eq!(names, ["cat0", "cat0_cuts", "cat0_holes", "cat4", "cat4_cuts", "cat4_holes"]);
+    let positions = |entry: &ShapeEntry| {
+        let mesh = entry.read().unwrap();
+        let points = entry.surface_points(&mesh).unwrap();
+        (mesh.area(), points.iter().map(|point| point.map(|p| p.position(&mesh))).collect::<Vec<_>>())
+    };
+    for (number, entry) in written.shapes.iter().enumerate() {
+        let whole = &written.shapes[number / 3 * 3];
+        let ((area, found), (whole_area, all)) = (positions(entry), positions(whole));
+        assert_eq!((entry.is_part(), entry.split, &entry.group), (number % 3 > 0, whole.split, &whole.group));
+        if entry.is_part() {
+            let share = area / whole_area;
+            let kept = found.iter().flatten().count() as f64 / all.iter().flatten().count() as f64;
+            assert!((0.3..0.9).contains(&share) && (kept - share).abs() < 0.15, "{share} {kept}");
+            assert!((entry.whole_area().unwrap().unwrap() / whole_area - 1.0).abs() < 1e-6);
+        }
+        assert!(std::iter::zip(&found, &all).all(|(point, of_whole)| point.is_none() || point == of_whole));
+    }
+
+    // Parts are not cut again.
+    let again = tempfile::tempdir().unwrap();
+    assert_eq!(write_parts(&written, again.path(), &PartOptions::default(), &quiet).unwrap(), 4);
 }
 
 fn triangulation_options() -> TriangulationOptions {

@@ -126,18 +126,23 @@ pub(crate) enum Simulated {
         #[command(flatten)]
         options: ScanOptions,
     },
-    /// Parts of a whole with holes or cut by a plane, in the layout of the SHREC'16 partial correspondence benchmark
+    /// Parts of a whole with holes or cut by a plane
     ///
-    /// Writes OUT/null/CLASS.off, the whole, and OUT/holes/holes_CLASS_shape_N.off with .baryc_gt
+    /// Of shapes that correspond vertex by vertex, in the layout of the SHREC'16 partial correspondence
+    /// benchmark: OUT/null/CLASS.off, the whole, and OUT/holes/holes_CLASS_shape_N.off with .baryc_gt
     /// (where on the whole each vertex lies), likewise OUT/cuts. Each class of the dataset needs
     /// three poses: the first is the whole; parts 1 to 10, for training, and the parts after them,
     /// for testing, are cut out of different ones.
+    ///
+    /// Of any others, a part of each kind of every shape beside the shape itself: OUT/shapes/NAME.ply and
+    /// OUT/shapes/NAME_holes.ply or NAME_cuts.ply, each with NAME.corr (line i: the triangle, counted
+    /// from 1, and the three weights of point i, -1 where it is cut away), and OUT/dataset.toml.
     ///
     ///   fmnet-train simulate parts TOSCA/dog data/dog-parts
     ///   fmnet-train train --dataset data/dog-parts --out runs/dog -k 100 --steps 1000
     #[command(verbatim_doc_comment)]
     Parts {
-        /// Poses to cut: a folder of shapes that correspond vertex by vertex within each class, such as TOSCA's
+        /// Shapes to cut: any dataset of whole shapes
         dataset: PathBuf,
         /// Folder for the parts
         out: PathBuf,
