@@ -122,7 +122,7 @@ impl Validation {
         let f = basis_source.project(&descriptors(network, &source.input)?);
         let g = basis_target.project(&descriptors(network, &target.input)?);
         let solver = config.fmap_solver().for_matching();
-        let solver = if s.entry.is_part() { FmapSolver::for_part(None) } else { solver };
+        let solver = if s.entry.is_part() { FmapSolver::for_part(None, solver) } else { solver };
         let (maps, _) = functional_maps(basis_source, basis_target, &f, &g, solver)?;
         let map = maps.point_map(solver.comparison(), basis_source, basis_target)?;
         let common: Vec<(u32, u32)> = (s.points.iter().zip(&t.points))

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use super::EvalError;
 use crate::Mesh;
 use crate::io::{path_from_bytes, read_point_map, read_surface_points};
-use crate::mesh::SurfacePoint;
+use crate::mesh::{SurfacePoint, vec3};
 use crate::point_map::PointMap;
 
 /// Correct matches between a source and a target, as pairs of 0-based vertices.
@@ -33,7 +33,8 @@ pub enum GroundTruthSource {
     /// `FILE`: a map file from source to target, or points on the target's surface, one for each source vertex (`.corr`,
     /// `.baryc_gt`).
     Map(PathBuf),
-    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex).
+    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex). Of two files of points on
+    /// surfaces (`.corr`), each source point counts at its nearest vertex, and of several at one vertex the nearest.
     Lists(PathBuf, PathBuf),
 }
 
@@ -91,6 +92,12 @@ impl GroundTruthSource {
                 super::check_size("the ground truth", points.len(), "the source", source.n_vertices())?;
                 Ok(GroundTruth::of_points(&points, target))
             }
+            Self::Lists(of_source, of_target) if holds_points(of_source) && holds_points(of_target) => {
+                let from = read_surface_points(of_source, source.n_faces())?;
+                let to = read_surface_points(of_target, target.n_faces())?;
+                check_lists([of_source, of_target], [from.len(), to.len()])?;
+                Ok(GroundTruth::of_points(&at_nearest_vertices(&from, &to, source), target))
+            }
             _ => self.load_vertices(source.n_vertices(), target.n_vertices()),
         }
     }
@@ -108,19 +115,39 @@ impl GroundTruthSource {
             Self::Lists(source_file, target_file) => {
                 let source = read_point_map(source_file, Some(n_source))?;
                 let target = read_point_map(target_file, Some(n_target))?;
-                if source.len() != target.len() {
-                    return Err(EvalError::ListMismatch {
-                        source_file: source_file.display().to_string(),
-                        n_source: source.len(),
-                        target_file: target_file.display().to_string(),
-                        n_target: target.len(),
-                    });
-                }
+                check_lists([source_file, target_file], [source.len(), target.len()])?;
                 let pairs = source.iter().zip(target.iter()).filter_map(|(s, t)| Some((s?, t?)));
                 GroundTruth::new(pairs.collect(), n_source, n_target)
             }
         }
     }
+}
+
+fn check_lists([source, target]: [&PathBuf; 2], [n_source, n_target]: [usize; 2]) -> Result<(), EvalError> {
+    if n_source == n_target {
+        return Ok(());
+    }
+    let (source_file, target_file) = (source.display().to_string(), target.display().to_string());
+    Err(EvalError::ListMismatch { source_file, n_source, target_file, n_target })
+}
+
+/// For every vertex of `mesh` the point of `to` whose fellow in `from` lies nearest to it, among those that lie nearest to no other vertex.
+fn at_nearest_vertices(
+    from: &[Option<SurfacePoint>],
+    to: &[Option<SurfacePoint>],
+    mesh: &Mesh,
+) -> Vec<Option<SurfacePoint>> {
+    let mut at_vertex = vec![None; mesh.n_vertices()];
+    let mut distances = vec![f64::INFINITY; mesh.n_vertices()];
+    for (point, fellow) in from.iter().zip(to) {
+        let (Some(point), Some(fellow)) = (point, fellow) else { continue };
+        let vertex = point.nearest_vertex(mesh) as usize;
+        let distance = vec3::distance(point.position(mesh), mesh.vertices()[vertex]);
+        if distance < distances[vertex] {
+            (distances[vertex], at_vertex[vertex]) = (distance, Some(*fellow));
+        }
+    }
+    at_vertex
 }
 
 /// Whether a file is a list of points on a surface.
@@ -240,6 +267,31 @@ mod tests {
             GroundTruthSource::FirstVertices(4).load_vertices(3, 4),
             Err(EvalError::IndexOutOfRange { side: "source", index: 3, .. })
         ));
+    }
+
+    #[test]
+    fn points_on_both_surfaces_count_at_the_nearest_vertex_of_the_source() {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = crate::mesh::shapes::icosphere(0);
+        let [a, b, c] = mesh.faces()[0];
+        let corners = [2, 5].map(|face: usize| mesh.faces()[face]);
+        let file = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).unwrap();
+            folder.path().join(name)
+        };
+        // Two points near the first corner, the second nearer; one near the second; one that the target lacks.
+        let source = file("a.corr", "1 0.8 0.2 0\n1 0.9 0.1 0\n1 0.1 0.9 0\n1 0 0 1\n");
+        let target = file("b.corr", "3 1 0 0\n3 0.2 0.8 0\n6 0 0 1\n-1\n");
+        let lists =
+            |target: &PathBuf| GroundTruthSource::Lists(source.clone(), target.clone()).load(&mesh, &mesh);
+        let truth = lists(&target).unwrap();
+        let mut expected = vec![(a, corners[0][1]), (b, corners[1][2])];
+        expected.sort_unstable();
+        assert_eq!(truth.pairs(), expected);
+        assert!(truth.points().unwrap().iter().any(|point| point.weights[1] == 0.8));
+        assert!(truth.pairs().iter().all(|pair| pair.0 != c));
+        let short = file("c.corr", "3 1 0 0\n");
+        assert!(matches!(lists(&short), Err(EvalError::ListMismatch { n_source: 4, n_target: 1, .. })));
     }
 
     #[test]

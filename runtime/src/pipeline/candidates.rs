@@ -7,15 +7,19 @@ use super::pair::{Pair, of_length};
 use super::refine::Found;
 use super::{Effort, Refinement};
 use crate::Matrix;
+use crate::descriptor::ShotOptions;
 use crate::error::Error;
-use crate::fmap::{FmapSolver, SolverKind};
 use crate::network::NativeNetwork;
-use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
+use crate::point_map::{Embedding, PointMap, RecoverError};
 use crate::quality::{Estimate, Quality};
 use serde::{Deserialize, Serialize};
 
 /// Steps of the adaptation of a doubtful pair.
 const ADAPTATION: usize = 10;
+
+/// Radius of SHOT where it stands in for a model that does not know the shapes, relative to sqrt(area): wide enough to tell a head from
+/// a hand.
+const SHOT_RADIUS: f64 = 0.12;
 
 /// Probability that the first map is bad from which the cheapest other one is tried.
 const WORTH_A_TRY: f64 = 0.2;
@@ -84,13 +88,15 @@ impl Pair<'_> {
     ) -> Result<Tried, Error> {
         let judged = judge.judge(&found)?;
         let mut tried = Tried::first("default", found, judged);
-        // Other refinements were asked for by name, and a part has no map back.
-        if self.is_part() || self.matcher.refinement(false) != Refinement::Wavelet {
+        // Other refinements were asked for by name.
+        if self.matcher.refinement(self.is_part()) != Refinement::Wavelet {
             return Ok(tried);
         }
         let all = self.matcher.effort == Effort::High || self.matcher.adapt.is_some_and(|steps| steps > 0);
         let more = self.matcher.effort != Effort::Low;
-        if all || more && tried.estimate.bad > WORTH_A_TRY {
+        // The filter of a part has none beside.
+        let beside = start.anchors.is_some() && !self.is_part();
+        if beside && (all || more && tried.estimate.bad > WORTH_A_TRY) {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             let found = self.refine(Refinement::Wavelet, &start)?;
             let judged = judge.judge(&found)?;
@@ -117,12 +123,20 @@ impl Pair<'_> {
             tried.add(name, found, judged);
             Ok(())
         };
-        attempt("features alone", &Start { anchors: start.anchors.clone(), ..self.by_features()? })?;
-        attempt("k = 50", &self.solved(own, k.min(50), 0.1, landmarks)?)?;
-        attempt("strong mask", &self.solved(own, k, 1.0, landmarks)?)?;
+        attempt("features alone", &Start { anchors: start.anchors.clone(), ..self.by_rows(own)? })?;
+        attempt("k = 50", &self.solved(own, k.min(50), 1.0, landmarks)?)?;
+        attempt("strong mask", &self.solved(own, k, 10.0, landmarks)?)?;
+        if self.is_part() {
+            return Ok(());
+        }
+        let shot = ShotOptions { radius: SHOT_RADIUS, ..self.matcher.shot };
+        let [source, target] =
+            [self.source, self.target].map(|described| described.shape.shot(&shot, self.context));
+        let anchors = self.anchors(None, landmarks);
+        attempt("SHOT alone", &Start { anchors, ..self.by_rows([&*source?, &*target?])? })?;
         if let Some((network, steps)) = self.adaptation() {
             let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
-            attempt("adapted", &self.solved([&source, &target], k, 0.1, landmarks)?)?;
+            attempt("adapted", &self.solved([&source, &target], k, 1.0, landmarks)?)?;
         }
         Ok(())
     }
@@ -133,10 +147,9 @@ impl Pair<'_> {
         Some((self.matcher.network()?.native()?, steps)).filter(|(_, steps)| *steps > 0)
     }
 
-    /// Nearest neighbours among the descriptors, without a functional map.
-    fn by_features(&self) -> Result<Start, Error> {
-        let [source, target] =
-            [self.source, self.target].map(|described| of_length(1.0, &described.descriptors));
+    /// Nearest neighbours among descriptors, without a functional map.
+    fn by_rows(&self, descriptors: [&Matrix<f32>; 2]) -> Result<Start, Error> {
+        let [source, target] = descriptors.map(|rows| of_length(1.0, rows));
         let embedding = Embedding::of_rows(source, target).map_err(RecoverError::from)?;
         let [map, back] = embedding.both()?;
         let [phi, psi] = self.bases(self.matcher.k)?;
@@ -144,17 +157,17 @@ impl Pair<'_> {
         Ok(Start { functional_map, map, back, embedding, anchors: None })
     }
 
-    /// The functional maps of descriptors at another `k` or weight of the mask.
+    /// The functional maps of descriptors at another `k` or so many times the usual weight of the mask.
     fn solved(
         &self,
         descriptors: [&Matrix<f32>; 2],
         k: usize,
-        weight: f64,
+        times: f64,
         landmarks: Option<&Landmarks>,
     ) -> Result<Start, Error> {
         let bases = self.bases(k)?;
-        let solver = FmapSolver::new(SolverKind::Joint, Some(weight));
+        let solver = self.matcher.solver(self.is_part()).with_mask(times);
         let (maps, _) = self.functional_maps(descriptors, &bases, solver, landmarks)?;
-        self.start(descriptors, &maps, Comparison::Joint, &bases, landmarks)
+        self.start(descriptors, &maps, solver.comparison(), &bases, landmarks)
     }
 }

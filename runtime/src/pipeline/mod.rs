@@ -136,7 +136,7 @@ impl Matcher {
             },
             k,
             solver: options.solver.unwrap_or(solver),
-            part_solver: FmapSolver::for_part(options.solver),
+            part_solver: FmapSolver::for_part(options.solver, solver),
             refinement: options.refinement.or(by_default),
             upscaling: options.upscaling,
             effort: options.effort,

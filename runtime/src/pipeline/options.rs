@@ -34,7 +34,7 @@ pub enum Refinement {
     /// ZoomOut (Melzi et al. 2019).
     #[default]
     Zoomout,
-    /// The wavelet filter, coarse to fine, in both directions (Hu, Li, Liu et al. 2021); for whole shapes only.
+    /// The wavelet filter, coarse to fine (Hu, Li, Liu et al. 2021): in both directions, of a part in that to its whole.
     Wavelet,
     /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
     /// meshes of equally many vertices, injective where the source has fewer.
@@ -47,10 +47,10 @@ pub enum Refinement {
 }
 
 impl Refinement {
-    /// What suits the maps of a solver: the wavelet filter for those of both directions, ZoomOut for others.
+    /// What suits the maps of a solver: the wavelet filter for those of both directions or of a part, ZoomOut for others.
     pub fn suiting(solver: FmapSolver) -> Self {
         match solver {
-            FmapSolver::Joint { .. } => Self::Wavelet,
+            FmapSolver::Joint { .. } | FmapSolver::Part { .. } => Self::Wavelet,
             _ => Self::Zoomout,
         }
     }

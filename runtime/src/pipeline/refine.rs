@@ -3,12 +3,14 @@
 use super::candidates::Start;
 use super::pair::Pair;
 use super::{DescribedShape, Refinement};
+use crate::Matrix;
 use crate::error::Error;
-use crate::point_map::{Comparison, Embedding, PointMap};
+use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::refine::{
     IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf,
-    wavelet, zoomout,
+    wavelet, wavelet_of_part, zoomout,
 };
+use crate::spectral::Eigenbasis;
 
 /// A map between the working meshes, both ways where both are known.
 pub(super) struct Found {
@@ -35,6 +37,7 @@ impl Pair<'_> {
             }
             Refinement::Icp => self.icp(start),
             Refinement::Zoomout => self.zoomout(start),
+            Refinement::Wavelet if self.is_part() => self.wavelet_of_part(start),
             Refinement::Wavelet => self.wavelet(start),
             Refinement::Pmf | Refinement::SharedTriangulation => {
                 self.product_manifold_filter(refinement, start)
@@ -54,18 +57,28 @@ impl Pair<'_> {
         let [source, target] = self.bases(self.refined_k())?;
         let options = ZoomOutOptions { part: self.is_part(), ..ZoomOutOptions::default() };
         let refined = self.timed("zoomout", || zoomout(&start.map, &source, &target, &options))?;
-        let c = &refined.functional_map;
-        // A part has fewer eigenfunctions.
-        let (source, target) = (source.truncated(c.cols()), target.truncated(c.rows()));
-        let embedding = Embedding::of_one(Comparison::Adjoint, c, &source, &target)?;
+        let embedding = adjoint_embedding(&refined.functional_map, &source, &target)?;
+        Ok(Found::in_embedding(refined.map, None, embedding))
+    }
+
+    fn wavelet_of_part(&self, start: &Start) -> Result<Found, Error> {
+        let k = self.refined_k();
+        let [source, target] = self.bases(k)?;
+        let options = WaveletOptions::coarse_to_fine(self.matcher.k, k);
+        let anchors = start.anchors.as_deref();
+        let refine = || wavelet_of_part(&start.map, &source, &target, anchors, &options);
+        let refined = self.timed("wavelet", refine)?;
+        let mut embedding = adjoint_embedding(&refined.functional_map, &source, &target)?;
+        if let Some([of_source, of_target]) = anchors {
+            embedding = embedding.with_columns(of_source, of_target);
+        }
         Ok(Found::in_embedding(refined.map, None, embedding))
     }
 
     fn wavelet(&self, start: &Start) -> Result<Found, Error> {
         let k = self.refined_k();
         let [source, target] = self.bases(k)?;
-        let options =
-            WaveletOptions { part: self.is_part(), ..WaveletOptions::coarse_to_fine(self.matcher.k, k) };
+        let options = WaveletOptions::coarse_to_fine(self.matcher.k, k);
         let hints = WaveletHints {
             anchors: start.anchors.as_deref(),
             meshes: Some([self.source.shape.mesh(), self.target.shape.mesh()]),
@@ -95,4 +108,14 @@ impl Pair<'_> {
         }
         Ok(Found { map: filtered.map, back: None, embedding: None, pmf_info: Some(filtered.info) })
     }
+}
+
+/// The embedding of a functional map in which a part, which has fewer eigenfunctions, is compared with its whole.
+fn adjoint_embedding(
+    c: &Matrix,
+    source: &Eigenbasis,
+    target: &Eigenbasis,
+) -> Result<Embedding, RecoverError> {
+    let (source, target) = (source.truncated(c.cols()), target.truncated(c.rows()));
+    Embedding::of_one(Comparison::Adjoint, c, &source, &target)
 }

@@ -14,7 +14,9 @@ use thiserror::Error;
 
 pub use icp::{IcpInfo, IcpOptions, icp};
 pub use pmf::{PmfHints, PmfInfo, PmfOptions, pmf};
-pub use wavelet::{RefinedBoth, WaveletHints, WaveletInfo, WaveletOptions, WaveletStage, wavelet};
+pub use wavelet::{
+    RefinedBoth, WaveletHints, WaveletInfo, WaveletOptions, WaveletStage, wavelet, wavelet_of_part,
+};
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
 /// A refined map.
@@ -85,12 +87,6 @@ pub enum RefineError {
         /// `source` or `target`.
         side: &'static str,
     },
-    /// The method is for whole shapes only.
-    #[error("{method} refines maps between whole shapes; refine the map of a part by zoomout, or not at all")]
-    Part {
-        /// The method.
-        method: &'static str,
-    },
     /// Not one source vertex has a match to start from.
     #[error("no source vertex is matched; refinement improves a map, it cannot start without one")]
     NothingMatched,
@@ -111,6 +107,12 @@ fn check_bases(basis_source: &Eigenbasis, basis_target: &Eigenbasis) -> Result<(
         Some((side, _)) => Err(RefineError::NoEigenfunctions { side }),
         None => Ok(()),
     }
+}
+
+/// How many eigenfunctions of a part belong to `k` of its whole: as many fewer as its area is smaller, as its eigenvalues are spaced the
+/// wider. Bases in one unit.
+fn eigenfunctions_of_part(k: usize, part: &Eigenbasis, whole: &Eigenbasis) -> usize {
+    ((k as f64 * part.area() / whole.area()).round() as usize).clamp(1, k)
 }
 
 #[cfg(test)]

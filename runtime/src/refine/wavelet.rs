@@ -6,6 +6,7 @@
 //! functions of unlike frequency fade, the more the farther apart they are, and with them what a wrong match brings in.
 
 mod bands;
+mod part;
 mod single;
 
 use super::zoomout::least_squares_map;
@@ -18,6 +19,8 @@ use crate::point_map::{Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
 use single::SingleRounds;
+
+pub use part::wavelet_of_part;
 
 /// Rounds at one number of eigenfunctions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,9 +37,6 @@ pub struct WaveletStage {
 pub struct WaveletOptions {
     /// One after the other. At least one; default 3 rounds at 60 eigenfunctions, 2 at 128, 3 at 200.
     pub stages: Vec<WaveletStage>,
-    /// Whether the source is a part of the target, which is refused: a part has no map back from all of the target. Default
-    /// false.
-    pub part: bool,
 }
 
 /// What else is known of a pair.
@@ -74,7 +74,7 @@ impl WaveletOptions {
         }
         let rounds = COARSE_TO_FINE[if stages.is_empty() { 0 } else { COARSE_TO_FINE.len() - 1 }].rounds;
         stages.push(WaveletStage { k: k_max, rounds });
-        Self { stages, part: false }
+        Self { stages }
     }
 }
 
@@ -100,7 +100,7 @@ pub struct RefinedBoth<Info> {
     pub info: Info,
 }
 
-/// Refines the point maps of both directions, `[source to target, target to source]`, by alternating between them and their
+/// Refines the point maps of both directions between whole shapes, `[source to target, target to source]`, by alternating between them and their
 /// filtered functional maps while the number of eigenfunctions grows.
 ///
 /// A round takes the functional maps that the point maps pull functions back by, `C12 = Psi^T A_target Phi[T21]` and
@@ -112,7 +112,7 @@ pub struct RefinedBoth<Info> {
 /// returned are in double precision.
 ///
 /// # Errors
-/// If an option is out of range, the source is a part, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
+/// If an option is out of range, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
 /// bases, a map matches nothing, or an entry of a basis is not finite.
 pub fn wavelet(
     maps: [&PointMap; 2],
@@ -262,7 +262,12 @@ fn check_hints(hints: WaveletHints, [source, target]: [&Eigenbasis; 2]) -> Resul
     {
         return Err(RefineError::Meshes { found, n_source, n_target });
     }
-    if let Some([a, b]) = hints.anchors
+    check_anchors(hints.anchors, [source, target])
+}
+
+fn check_anchors(anchors: Option<&[Matrix; 2]>, bases: [&Eigenbasis; 2]) -> Result<(), RefineError> {
+    let [n_source, n_target] = bases.map(Eigenbasis::n);
+    if let Some([a, b]) = anchors
         && ([a.rows(), b.rows()] != [n_source, n_target] || a.cols() != b.cols())
     {
         let found = [a.rows(), a.cols(), b.rows(), b.cols()];
@@ -272,9 +277,6 @@ fn check_hints(hints: WaveletHints, [source, target]: [&Eigenbasis; 2]) -> Resul
 }
 
 fn check(options: &WaveletOptions) -> Result<(), RefineError> {
-    if options.part {
-        return Err(RefineError::Part { method: "the wavelet filter" });
-    }
     let least = |option, value| match value {
         0 => Err(RefineError::Option { option, value, range: "at least 1".to_string() }),
         _ => Ok(()),

@@ -1,7 +1,7 @@
 //! ZoomOut (Melzi et al. 2019): spectral upsampling of a map.
 
 use super::sampling::farthest_points;
-use super::{RefineError, Refined, check_bases};
+use super::{RefineError, Refined, check_bases, eigenfunctions_of_part};
 use crate::Matrix;
 use crate::fmap::{
     LeastSquaresOptions, functional_map_of, least_squares, mean_with_transpose, multiply,
@@ -114,7 +114,7 @@ pub fn zoomout(
         }
     }
     let k_source = |k: usize| match options.part {
-        true => ((k as f64 * basis_source.area() / basis_target.area()).round() as usize).clamp(1, k),
+        true => eigenfunctions_of_part(k, basis_source, basis_target),
         false => k,
     };
     let bidirectional = options.bidirectional && !options.part;

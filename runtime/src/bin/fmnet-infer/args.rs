@@ -233,12 +233,12 @@ pub(crate) struct EvaluateArgs {
     /// Target mesh
     #[arg(long)]
     pub(crate) target: PathBuf,
-    /// `identity` (vertex i corresponds with vertex i), a map file, or two .vts files separated by a comma (line i of the
-    /// one corresponds with line i of the other)
-    #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
+    /// `identity` (vertex i corresponds with vertex i), a map file, points on the target (.corr, .baryc_gt), or two .vts or .corr
+    /// files separated by a comma (line i of the one corresponds with line i of the other)
+    #[arg(long, value_name = "identity|FILE|FILE_A,FILE_B")]
     pub(crate) ground_truth: OsString,
     /// Second ground truth, the left-right mirrored one; the better of the two counts
-    #[arg(long, value_name = "identity|FILE|VTS_A,VTS_B")]
+    #[arg(long, value_name = "identity|FILE|FILE_A,FILE_B")]
     pub(crate) symmetric_ground_truth: Option<OsString>,
     /// Output: .csv (curve), .svg (plot) or .html (report with pictures); may be given several times
     #[arg(short, long = "output")]

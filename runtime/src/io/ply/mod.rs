@@ -96,6 +96,11 @@ fn read_body<S: Source>(
         check_count(&source, element)?;
         match element.name.as_str() {
             "vertex" => uvs = records::read_vertices(&mut source, element, builder)?,
+            // There is nothing to read of them, so no count would ever be too large.
+            "face" | "tristrips" if element.properties.is_empty() && element.count > 0 => {
+                let problem = format!("{} records of '{}' without a property", element.count, element.name);
+                return Err(ParseError::part("header", problem));
+            }
             "face" => faces = records::read_faces(&mut source, element, n_vertices, builder)?,
             "tristrips" => records::read_strips(&mut source, element, n_vertices, builder)?,
             _ => {

@@ -229,6 +229,8 @@ fn hostile_counts_are_refused_before_memory_is_taken() {
         ("element vertex 900719925474099\nproperty double x\nproperty double y\nproperty double z\n", ""),
         ("element other 900719925474099\nproperty list uchar int x\n", "\u{1}"),
         ("element other 1\nproperty list uint double x\n", "\u{7f}\u{7f}\u{7f}\u{7f}"),
+        ("element face 900719925474099\n", ""),
+        ("element tristrips 900719925474099\n", ""),
     ] {
         let text = format!("ply\nformat binary_little_endian 1.0\n{properties}end_header\n{body}");
         assert!(read(text.as_bytes(), Path::new("")).is_err());

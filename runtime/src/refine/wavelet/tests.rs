@@ -37,7 +37,7 @@ fn share_equal(found: &PointMap, expected: &PointMap) -> f64 {
 
 fn options() -> WaveletOptions {
     let stages = [(12, 4), (30, 3), (60, 3)].map(|(k, rounds)| WaveletStage { k, rounds });
-    WaveletOptions { stages: stages.to_vec(), ..WaveletOptions::default() }
+    WaveletOptions { stages: stages.to_vec() }
 }
 
 fn refined(
@@ -124,7 +124,7 @@ fn stages_begin_at_the_map_s_k_and_end_where_asked() {
 }
 
 #[test]
-fn options_out_of_range_and_parts_are_errors() {
+fn options_out_of_range_are_errors() {
     let basis = rectangle(9, 8, 10);
     let map = PointMap::new((0..72).collect(), 72);
     let default = WaveletOptions::default();
@@ -133,13 +133,12 @@ fn options_out_of_range_and_parts_are_errors() {
     };
     let stage = |k, rounds| vec![WaveletStage { k, rounds }];
     for (options, name) in [
-        (WaveletOptions { stages: Vec::new(), ..default.clone() }, "the number of stages"),
-        (WaveletOptions { stages: stage(0, 1), ..default.clone() }, "k of a stage"),
-        (WaveletOptions { stages: stage(1, 0), ..default.clone() }, "rounds of a stage"),
+        (WaveletOptions { stages: Vec::new() }, "the number of stages"),
+        (WaveletOptions { stages: stage(0, 1) }, "k of a stage"),
+        (WaveletOptions { stages: stage(1, 0) }, "rounds of a stage"),
     ] {
         assert_eq!(fails(&options).to_string(), format!("{name} is 0, but must be at least 1"));
     }
-    assert!(fails(&WaveletOptions { part: true, ..default.clone() }).to_string().contains("zoomout"));
     let short = PointMap::new(vec![0; 3], 72);
     for maps in [[&short, &map], [&map, &short]] {
         assert!(matches!(
@@ -157,7 +156,7 @@ fn thread_count_does_not_matter() {
     let exact = PointMap::new((0..5250).collect(), 5250);
     let start = partly_wrong(&[exact.clone(), exact]);
     let stages = [(12, 2), (40, 3)].map(|(k, rounds)| WaveletStage { k, rounds }).to_vec();
-    let options = WaveletOptions { stages, ..WaveletOptions::default() };
+    let options = WaveletOptions { stages };
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| refined(&start, [&basis, &basis], &options))
@@ -207,4 +206,45 @@ fn anchors_decide_where_the_eigenfunctions_do_not() {
     let hints = WaveletHints { anchors: Some(&short), meshes: None };
     let failed = wavelet([&exact, &exact], &basis, &basis, hints, &options()).unwrap_err();
     assert!(matches!(failed, RefineError::Descriptors { .. }));
+}
+
+/// The first `k` eigenfunctions of a mesh where an area of `unit` counts as 1.
+fn basis_of(mesh: &Mesh, unit: f64, k: usize) -> Eigenbasis {
+    let laplacian = crate::spectral::Laplacian::new(mesh);
+    let (basis, _) = crate::spectral::eigenbasis(&laplacian, k, &Default::default()).unwrap();
+    basis.in_unit(unit, k)
+}
+
+/// Of a part with a third of its matches wrong, all become right but for neighbours.
+#[test]
+fn a_part_finds_its_place_on_the_whole() {
+    let whole = crate::mesh::shapes::bumpy_sphere(4, 1);
+    let kept: Vec<u32> =
+        (0..whole.n_vertices() as u32).filter(|&v| whole.vertices()[v as usize][2] > -0.2).collect();
+    let place: std::collections::HashMap<u32, u32> = kept.iter().copied().zip(0..).collect();
+    let faces = whole.faces().iter().filter_map(|face| {
+        let [a, b, c] = face.map(|v| place.get(&v).copied());
+        Some([a?, b?, c?])
+    });
+    let part =
+        Mesh::new(kept.iter().map(|&v| whole.vertices()[v as usize]).collect(), faces.collect()).unwrap();
+    let bases = [&part, &whole].map(|mesh| basis_of(mesh, whole.area(), 60));
+    let exact = PointMap::new(kept, whole.n_vertices());
+    let mut start = exact.clone();
+    (0..start.len()).step_by(3).for_each(|x| start.targets[x] = (x as u32 * 7 + 500) % exact.n_target as u32);
+    let refined = wavelet_of_part(&start, &bases[0], &bases[1], None, &options()).unwrap();
+    let far = |map: &PointMap| {
+        let apart = |x: usize| {
+            let [found, right] = [map, &exact].map(|map| whole.vertices()[map.targets[x] as usize]);
+            crate::mesh::vec3::distance(found, right)
+        };
+        (0..map.len()).map(apart).sum::<f64>() / map.len() as f64 / whole.scale()
+    };
+    assert!(far(&start) > 0.05 && far(&refined.map) < 0.01, "{} {}", far(&start), far(&refined.map));
+    let share = part.area() / whole.area();
+    let expected = (60.0 * share).round() as usize;
+    assert_eq!([refined.functional_map.rows(), refined.functional_map.cols()], [60, expected]);
+    let none = PointMap::new(vec![PointMap::UNMATCHED; part.n_vertices()], whole.n_vertices());
+    let failed = wavelet_of_part(&none, &bases[0], &bases[1], None, &options());
+    assert_eq!(failed, Err(RefineError::NothingMatched));
 }
