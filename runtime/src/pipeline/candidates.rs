@@ -94,9 +94,7 @@ impl Pair<'_> {
         }
         let all = self.matcher.effort == Effort::High || self.matcher.adapt.is_some_and(|steps| steps > 0);
         let more = self.matcher.effort != Effort::Low;
-        // The filter of a part has none beside.
-        let beside = start.anchors.is_some() && !self.is_part();
-        if beside && (all || more && tried.estimate.bad > WORTH_A_TRY) {
+        if self.descriptors_tell_vertices() && (all || more && tried.estimate.bad > WORTH_A_TRY) {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             let found = self.refine(Refinement::Wavelet, &start)?;
             let judged = judge.judge(&found)?;

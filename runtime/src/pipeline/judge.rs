@@ -59,7 +59,7 @@ impl Pair<'_> {
             ));
         } else if estimate.doubtful {
             let remedy = match self.is_part() {
-                true => "--landmarks, -k 50 or a larger part",
+                true => "--landmarks or a larger part",
                 false => "--effort high, --landmarks or --adapt",
             };
             self.warn(&format!(

@@ -171,6 +171,12 @@ impl Pair<'_> {
         Ok(embedding.point_maps(matches))
     }
 
+    /// Whether a model was trained to tell vertices by its descriptors, not only to make functional maps of them.
+    pub(super) fn descriptors_tell_vertices(&self) -> bool {
+        self.matcher.network().is_some()
+            && matches!(self.matcher.solver(self.is_part()), FmapSolver::Joint { .. })
+    }
+
     /// What counts beside the embeddings of refinement: descriptors, where a model was trained to tell vertices by them, and
     /// landmarks.
     pub(super) fn anchors(
@@ -178,10 +184,8 @@ impl Pair<'_> {
         descriptors: Option<[&Matrix<f32>; 2]>,
         landmarks: Option<&Landmarks>,
     ) -> Option<Box<[Matrix; 2]>> {
-        let tell_vertices = self.matcher.network().is_some()
-            && matches!(self.matcher.solver(self.is_part()), FmapSolver::Joint { .. });
         let own = descriptors
-            .filter(|_| tell_vertices)
+            .filter(|_| self.descriptors_tell_vertices())
             .map(|own| own.map(|rows| of_length(DESCRIPTORS_BESIDE, rows)));
         // Rows of a joint embedding at unit area have a squared length of about twice the eigenfunctions.
         let given = landmarks.map(|landmarks| landmarks.anchors(2.0 * self.refined_k() as f64));

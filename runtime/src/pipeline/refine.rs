@@ -3,14 +3,12 @@
 use super::candidates::Start;
 use super::pair::Pair;
 use super::{DescribedShape, Refinement};
-use crate::Matrix;
 use crate::error::Error;
-use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
+use crate::point_map::{Comparison, Embedding, PointMap};
 use crate::refine::{
-    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions, icp, pmf,
-    wavelet, wavelet_of_part, zoomout,
+    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions,
+    adjoint_embedding, icp, pmf, wavelet, wavelet_of_part, zoomout,
 };
-use crate::spectral::Eigenbasis;
 
 /// A map between the working meshes, both ways where both are known.
 pub(super) struct Found {
@@ -57,7 +55,7 @@ impl Pair<'_> {
         let [source, target] = self.bases(self.refined_k())?;
         let options = ZoomOutOptions { part: self.is_part(), ..ZoomOutOptions::default() };
         let refined = self.timed("zoomout", || zoomout(&start.map, &source, &target, &options))?;
-        let embedding = adjoint_embedding(&refined.functional_map, &source, &target)?;
+        let embedding = adjoint_embedding(&refined.functional_map, &source, &target, None)?;
         Ok(Found::in_embedding(refined.map, None, embedding))
     }
 
@@ -68,10 +66,7 @@ impl Pair<'_> {
         let anchors = start.anchors.as_deref();
         let refine = || wavelet_of_part(&start.map, &source, &target, anchors, &options);
         let refined = self.timed("wavelet", refine)?;
-        let mut embedding = adjoint_embedding(&refined.functional_map, &source, &target)?;
-        if let Some([of_source, of_target]) = anchors {
-            embedding = embedding.with_columns(of_source, of_target);
-        }
+        let embedding = adjoint_embedding(&refined.functional_map, &source, &target, anchors)?;
         Ok(Found::in_embedding(refined.map, None, embedding))
     }
 
@@ -108,14 +103,4 @@ impl Pair<'_> {
         }
         Ok(Found { map: filtered.map, back: None, embedding: None, pmf_info: Some(filtered.info) })
     }
-}
-
-/// The embedding of a functional map in which a part, which has fewer eigenfunctions, is compared with its whole.
-fn adjoint_embedding(
-    c: &Matrix,
-    source: &Eigenbasis,
-    target: &Eigenbasis,
-) -> Result<Embedding, RecoverError> {
-    let (source, target) = (source.truncated(c.cols()), target.truncated(c.rows()));
-    Embedding::of_one(Comparison::Adjoint, c, &source, &target)
 }

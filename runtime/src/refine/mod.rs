@@ -8,7 +8,7 @@ mod zoomout;
 
 use crate::Matrix;
 use crate::fmap::FmapError;
-use crate::point_map::{PointMap, RecoverError, search::SearchError};
+use crate::point_map::{Comparison, Embedding, PointMap, RecoverError, search::SearchError};
 use crate::spectral::Eigenbasis;
 use thiserror::Error;
 
@@ -107,6 +107,22 @@ fn check_bases(basis_source: &Eigenbasis, basis_target: &Eigenbasis) -> Result<(
         Some((side, _)) => Err(RefineError::NoEigenfunctions { side }),
         None => Ok(()),
     }
+}
+
+/// The embedding of a functional map, `[k_target, k_source]`, and its adjoint, in as many eigenfunctions of each shape, of which a part has
+/// fewer; with columns beside the rows, where there are any.
+pub(crate) fn adjoint_embedding(
+    c: &Matrix,
+    basis_source: &Eigenbasis,
+    basis_target: &Eigenbasis,
+    columns: Option<&[Matrix; 2]>,
+) -> Result<Embedding, RecoverError> {
+    let (source, target) = (basis_source.truncated(c.cols()), basis_target.truncated(c.rows()));
+    let embedding = Embedding::of_one(Comparison::Adjoint, c, &source, &target)?;
+    Ok(match columns {
+        Some([of_source, of_target]) => embedding.with_columns(of_source, of_target),
+        None => embedding,
+    })
 }
 
 /// How many eigenfunctions of a part belong to `k` of its whole: as many fewer as its area is smaller, as its eigenvalues are spaced the

@@ -48,7 +48,7 @@ pub struct PartOptions {
     /// Most holes of a part, min-holes to 100 [default: 12]
     #[arg(long, default_value_t = Self::default().max_holes, hide_default_value = true)]
     pub max_holes: usize,
-    /// Test parts of each kind and class, besides the 10 for training, 1 to 10000 [default: 20]
+    /// Test parts of each kind and class in the layout of SHREC'16, besides the 10 for training, 1 to 10000 [default: 20]
     #[arg(long, default_value_t = Self::default().test_parts, hide_default_value = true)]
     pub test_parts: usize,
     /// Another seed, other parts [default: 0]

@@ -23,8 +23,8 @@ struct Job<'a> {
 
 /// Writes parts of the shapes of a dataset, and says how many there are.
 ///
-/// Where shapes share a triangulation, in the layout of SHREC'16: each group is a class, with at least three shapes in vertex to vertex correspondence, as in TOSCA: the first by name is
-/// the whole, in its pose; the first half of the others gives the 10 training parts, which come first, and the second half the
+/// Where shapes share a triangulation, in the layout of SHREC'16: each group is a class, with at least three shapes in vertex to vertex
+/// correspondence, as in TOSCA: the first by name is the whole, in its pose; the first half of the others gives the 10 training parts, which come first, and the second half the
 /// test parts, so that these share neither pose nor cut with the training parts. Other shapes are written as they are with a part of
 /// each kind beside them, `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and a manifest that keeps groups and splits.
 ///

@@ -1,19 +1,15 @@
 //! Parts of shapes that have triangulations of their own: `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and
 //! `dataset.toml`.
 
-use super::folder::{claim, save};
-use super::{Part, PartKind, PartOptions, SimulateError, SimulateProgress, cut_part};
-use crate::dataset::{Correspondence, Dataset, ShapeEntry, manifest};
+use super::folder::{SHAPES, check_names, claim, save_with_points, surface_entry};
+use super::{Part, PartOptions, SimulateError, SimulateProgress, cut_part};
+use crate::dataset::{Dataset, ShapeEntry, manifest};
 use fmnet::Mesh;
-use fmnet::io::write_surface_points;
 use fmnet::mesh::SurfacePoint;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The folder of the meshes.
-const SHAPES: &str = "shapes";
 
 /// Writes every whole shape with a part of each kind, and says how many parts there are; see
 /// [`write_parts`](super::write_parts()).
@@ -28,6 +24,7 @@ pub(super) fn write_surface_parts(
     if wholes.is_empty() {
         return Err(unfit("no whole shapes to cut".into()));
     }
+    check_names(dataset, wholes.iter().copied())?;
     claim(out, &[SHAPES], "parts", &dataset.folder, options)?;
     let named = |name: &str| wholes.iter().any(|whole| whole.name == name);
     if let Some(name) = wholes.iter().flat_map(|whole| part_names(whole, options)).find(|name| named(name)) {
@@ -37,16 +34,20 @@ pub(super) fn write_surface_parts(
     let make = |(number, whole): (usize, &&ShapeEntry)| {
         let mesh = whole.read()?;
         let points = whole.surface_points(&mesh)?;
-        let written = written(whole, out, &whole.name, None);
-        save_with_points(&written, &mesh, &points)?;
-        let mut entries = vec![written];
+        let mut entries = vec![surface_entry(whole, out, whole.name.clone())];
+        if !entries[0].mesh.is_file() {
+            save_with_points(&entries[0], &mesh, &points)?;
+        }
         for (&kind, name) in options.kinds.iter().zip(part_names(whole, options)) {
-            let part = written_part(&entries[0], out, &name);
-            // The mesh is written last, so that one that is there is complete.
+            let unit = Some(entries[0].mesh.clone());
+            let part = ShapeEntry { whole: unit, ..surface_entry(whole, out, name) };
             if !part.mesh.is_file() {
-                cut(&part, &mesh, &points, kind, options, number).map_err(|e| e.in_shape(&whole.name))?;
+                let made =
+                    cut_part(&mesh, kind, options, number as u64).map_err(|e| e.in_shape(&whole.name))?;
+                save_with_points(&part, &made.mesh, &points_of_part(&made, &mesh, &points))?;
             }
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, wholes.len() * options.kinds.len(), &name);
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(count, wholes.len() * options.kinds.len(), &part.name);
             entries.push(part);
         }
         Ok::<Vec<ShapeEntry>, SimulateError>(entries)
@@ -59,41 +60,6 @@ pub(super) fn write_surface_parts(
 /// The names of a shape's parts, by kind.
 fn part_names(whole: &ShapeEntry, options: &PartOptions) -> impl Iterator<Item = String> {
     options.kinds.iter().map(|kind| format!("{}_{}", whole.name, kind.name()))
-}
-
-/// The entry of a shape that is written as `name`.
-fn written(entry: &ShapeEntry, out: &Path, name: &str, whole: Option<PathBuf>) -> ShapeEntry {
-    let file = |extension: &str| out.join(SHAPES).join(format!("{name}.{extension}"));
-    let (mesh, correspondence) = (file("ply"), Correspondence::Surface(file("corr")));
-    ShapeEntry { name: name.to_string(), mesh, correspondence, whole, ..entry.clone() }
-}
-
-fn written_part(whole: &ShapeEntry, out: &Path, name: &str) -> ShapeEntry {
-    written(whole, out, name, Some(whole.mesh.clone()))
-}
-
-fn cut(
-    part: &ShapeEntry,
-    whole: &Mesh,
-    points: &[Option<SurfacePoint>],
-    kind: PartKind,
-    options: &PartOptions,
-    number: usize,
-) -> Result<(), SimulateError> {
-    let made = cut_part(whole, kind, options, number as u64)?;
-    let points = points_of_part(&made, whole, points);
-    save_with_points(part, &made.mesh, &points)
-}
-
-fn save_with_points(
-    entry: &ShapeEntry,
-    mesh: &Mesh,
-    points: &[Option<SurfacePoint>],
-) -> Result<(), SimulateError> {
-    if let Correspondence::Surface(path) = &entry.correspondence {
-        write_surface_points(path, points)?;
-    }
-    save(&entry.mesh, mesh)
 }
 
 /// Where points of the whole lie on the part, `None` where their triangle was cut away.

@@ -1,18 +1,14 @@
 //! A folder of triangulations with correspondences: `shapes/NAME.ply`, `shapes/NAME.corr`, `dataset.toml`.
 
-use super::folder::{claim, save};
+use super::folder::{SHAPES, check_names, claim, save_with_points, surface_entry};
 use super::{SimulateError, SimulateProgress, TriangulationOptions, triangulated};
-use crate::dataset::{Correspondence, Dataset, ShapeEntry, Split, manifest};
+use crate::dataset::{Dataset, ShapeEntry, Split, manifest};
 use fmnet::Mesh;
-use fmnet::io::write_surface_points;
 use fmnet::mesh::{SurfacePoint, farthest_point_sampling_by, vec3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The folder of the meshes.
-const SHAPES: &str = "shapes";
 
 /// Which of a group's points correspond in what is written.
 struct Landmarks {
@@ -45,10 +41,7 @@ pub fn write_triangulations(
     if entries().next().is_none() {
         return Err(unfit("no shapes in these splits".into()));
     }
-    if let Some((_, shape)) = entries().find(|(_, s)| s.name.contains(['/', '\\']) || s.name.starts_with('.'))
-    {
-        return Err(unfit(format!("the name {:?} is no name for a file; choose another one", shape.name)));
-    }
+    check_names(dataset, entries().map(|(_, shape)| shape))?;
     claim(out, &[SHAPES], "triangulations", &dataset.folder, options)?;
     let mut landmarks = BTreeMap::new();
     for (_, entry) in entries() {
@@ -79,9 +72,7 @@ fn renamed(entry: &ShapeEntry, copy: usize, options: &TriangulationOptions, out:
         1 => entry.name.clone(),
         _ => format!("{}_{copy}", entry.name),
     };
-    let file = |extension: &str| out.join(SHAPES).join(format!("{name}.{extension}"));
-    let (mesh, correspondence) = (file("ply"), Correspondence::Surface(file("corr")));
-    ShapeEntry { name, mesh, correspondence, ..entry.clone() }
+    surface_entry(entry, out, name)
 }
 
 /// Makes one shape, unless it is there, and says what it is.
@@ -92,17 +83,13 @@ fn make(
     options: &TriangulationOptions,
     index: u64,
 ) -> Result<String, SimulateError> {
-    // The mesh is written last, so that one that is there is complete.
     if new.mesh.is_file() {
         return Ok(new.name.clone());
     }
     let mesh = entry.read()?;
     let points = landmarks.of(entry, &mesh)?;
     let made = triangulated(&mesh, &points, options, index)?;
-    if let Correspondence::Surface(path) = &new.correspondence {
-        write_surface_points(path, &made.points)?;
-    }
-    save(&new.mesh, &made.mesh)?;
+    save_with_points(new, &made.mesh, &made.points)?;
     Ok(format!("{} ({})", new.name, made.plan))
 }
 

@@ -4,8 +4,8 @@ use super::bands::filter_mask;
 use super::{WaveletInfo, WaveletOptions, check, check_anchors, rounds};
 use crate::Matrix;
 use crate::fmap::functional_map_of;
-use crate::point_map::{Comparison, Embedding, PointMap};
-use crate::refine::{RefineError, Refined, check_bases, eigenfunctions_of_part};
+use crate::point_map::PointMap;
+use crate::refine::{RefineError, Refined, adjoint_embedding, check_bases, eigenfunctions_of_part};
 use crate::spectral::Eigenbasis;
 
 /// As [`wavelet`](super::wavelet()), of the map of a part of the target: only the direction to the whole, from which alone nothing is missing.
@@ -42,11 +42,7 @@ pub fn wavelet_of_part(
         let mask = filter_mask(&source.eigenvalues, &target.eigenvalues);
         let c = functional_map_of(&map, &source, &target)?;
         functional_map = Matrix::from_fn(c.rows(), c.cols(), |i, j| mask[(i, j)] * c[(i, j)]);
-        let mut embedding = Embedding::of_one(Comparison::Adjoint, &functional_map, &source, &target)?;
-        if let Some([of_source, of_target]) = anchors {
-            embedding = embedding.with_columns(of_source, of_target);
-        }
-        map = embedding.forth()?;
+        map = adjoint_embedding(&functional_map, basis_source, basis_target, anchors)?.forth()?;
     }
     Ok(Refined { map, functional_map, info: WaveletInfo { rounds: ks } })
 }
