@@ -77,7 +77,8 @@ impl<T: Copy> Matrix<T> {
     /// If there are fewer columns.
     pub fn first_cols(&self, cols: usize) -> Self {
         assert!(cols <= self.cols, "asked for {cols} of {} columns", self.cols);
-        let data = (0..self.rows).flat_map(|i| self.row(i)[..cols].iter().copied()).collect();
+        let mut data = Vec::with_capacity(self.rows * cols);
+        (0..self.rows).for_each(|i| data.extend_from_slice(&self.row(i)[..cols]));
         Self { rows: self.rows, cols, data }
     }
 

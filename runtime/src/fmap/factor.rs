@@ -11,7 +11,7 @@ const SINGULAR: f64 = 1e-12;
 
 /// A symmetric positive semi-definite `[k, k]` system, ready to be solved many times.
 #[derive(Clone, Debug)]
-pub(super) enum Factor {
+pub(crate) enum Factor {
     /// The lower Cholesky factor.
     Cholesky(Mat<f64>),
     /// The singular value decomposition, of which the first so many directions count: solutions of least norm.
@@ -20,7 +20,7 @@ pub(super) enum Factor {
 
 impl Factor {
     /// Factors `system` by Cholesky's method, or truncates it where it is singular to working precision.
-    pub(super) fn new(system: Mat<f64>) -> Result<Self, FmapError> {
+    pub(crate) fn new(system: Mat<f64>) -> Result<Self, FmapError> {
         if let Some(factor) = Self::cholesky(system.clone())
             && factor.condition() < 1.0 / SINGULAR
         {
@@ -66,7 +66,7 @@ impl Factor {
 
     /// Replaces every column of `right`, `[k, m]`, by its solution. The work is done on a copy of its own: what faer rounds depends
     /// on where in memory a column begins, and a [`Mat`] always begins at the same alignment.
-    pub(super) fn solve(&self, mut right: MatMut<'_, f64>) {
+    pub(crate) fn solve(&self, mut right: MatMut<'_, f64>) {
         match self {
             Self::Cholesky(lower) => {
                 let scratch = solve::solve_in_place_scratch::<f64>(lower.nrows(), right.ncols(), Par::Seq);

@@ -24,6 +24,7 @@ use thiserror::Error;
 
 pub use adjoint::functional_map_of;
 pub use both::{BothMaps, bidirectional, both_maps, functional_maps};
+pub(crate) use factor::Factor;
 pub use least_squares::{LeastSquaresOptions, least_squares};
 pub use part::part;
 pub use points::{from_points, pseudo_inverse};

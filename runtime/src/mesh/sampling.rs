@@ -1,6 +1,7 @@
 //! Samples of the vertices: spread evenly, or drawn by area.
 
-use super::{Mesh, vec3};
+use super::Mesh;
+use crate::numeric::vectorized;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -10,10 +11,13 @@ use rand_chacha::ChaCha8Rng;
 /// wins a tie. A `start` that is no vertex, or `count` 0, gives none.
 pub fn farthest_point_sampling(mesh: &Mesh, count: usize, start: u32) -> Vec<u32> {
     let vertices = mesh.vertices();
-    farthest_point_sampling_by(vertices.len(), count, start, |source, distances| {
+    let along = |axis: usize| vertices.iter().map(|p| p[axis]).collect::<Vec<f64>>();
+    let [x, y, z] = [along(0), along(1), along(2)];
+    // Squares are in the order of the distances.
+    farthest_point_sampling_by(vertices.len(), count, start, |source, squares| {
         let from = vertices[source as usize];
-        for (distance, &p) in distances.iter_mut().zip(vertices) {
-            *distance = vec3::distance(from, p);
+        for (((square, x), y), z) in squares.iter_mut().zip(&x).zip(&y).zip(&z) {
+            *square = (x - from[0]).powi(2) + (y - from[1]).powi(2) + (z - from[2]).powi(2);
         }
     })
 }
@@ -36,18 +40,30 @@ pub fn farthest_point_sampling_by(
     let mut samples = vec![start];
     while samples.len() < count.min(n) {
         let last = samples[samples.len() - 1];
-        distances_from(last, &mut distances);
         nearest[last as usize] = -1.0;
-        let mut farthest = (-1.0, 0);
-        for (i, (nearest, &distance)) in nearest.iter_mut().zip(&distances).enumerate() {
-            *nearest = nearest.min(distance);
-            if *nearest > farthest.0 {
-                farthest = (*nearest, i as u32);
-            }
-        }
-        samples.push(farthest.1);
+        let farthest = vectorized(|| {
+            distances_from(last, &mut distances);
+            nearest.iter_mut().zip(&distances).for_each(|(nearest, &distance)| {
+                *nearest = if distance < *nearest { distance } else { *nearest };
+            });
+            largest(&nearest)
+        });
+        samples.push(nearest.iter().position(|&distance| distance == farthest).unwrap_or(0) as u32);
     }
     samples
+}
+
+/// The largest of numbers from -1 up.
+#[inline(always)]
+fn largest(numbers: &[f64]) -> f64 {
+    let (chunks, rest) = numbers.as_chunks::<16>();
+    let mut lanes = [-1.0; 16];
+    for chunk in chunks {
+        for (lane, &number) in lanes.iter_mut().zip(chunk) {
+            *lane = if number > *lane { number } else { *lane };
+        }
+    }
+    lanes.iter().chain(rest).copied().fold(-1.0, f64::max)
 }
 
 /// Draws `min(count, n)` different vertices by their `areas`, `[n]` in any unit, each next one with a probability
@@ -73,7 +89,7 @@ pub fn area_weighted_sampling(areas: &[f64], count: usize, seed: u64) -> Vec<u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::mesh::{shapes, vec3};
     use std::collections::BTreeSet;
 
     fn all_different(samples: &[u32]) -> bool {

@@ -2,6 +2,7 @@
 
 use super::{Mesh, triangle};
 use crate::Matrix;
+use crate::numeric::Real;
 
 /// A point on a mesh: a triangle and the barycentric weights of its corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,10 +47,10 @@ impl SurfacePoint {
     ///
     /// # Panics
     /// If the mesh has no such triangle, or the matrix has no such row.
-    pub fn interpolate(&self, mesh: &Mesh, values: &Matrix) -> Vec<f64> {
+    pub fn interpolate<T: Real>(&self, mesh: &Mesh, values: &Matrix<T>) -> Vec<T> {
         let [a, b, c] = mesh.faces()[self.face as usize].map(|i| values.row(i as usize));
-        let [u, v, w] = self.weights;
-        a.iter().zip(b).zip(c).map(|((a, b), c)| u * a + v * b + w * c).collect()
+        let [u, v, w] = self.weights.map(T::from_double);
+        a.iter().zip(b).zip(c).map(|((&a, &b), &c)| u * a + v * b + w * c).collect()
     }
 }
 

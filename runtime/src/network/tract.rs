@@ -1,8 +1,9 @@
 //! The back-end on tract: pure Rust, built in.
 //!
 //! tract is fastest when it knows `n`, so the graph is optimised anew for each number of rows and kept while shapes of the same
-//! size follow. Its products and its element-wise operations are spread over the threads of the caller's pool; where rows do not
-//! depend on each other they are split into blocks of a fixed size instead.
+//! size follow. Where rows do not depend on each other, blocks of a fixed size are spread over the threads; other networks run on one thread
+//! each, as tract's own threads would make the program a tenth larger and its build a fifth longer, and DiffusionNets of `fmnet-train` run
+//! on the library's own kernels.
 
 use super::Engine;
 use super::contract::{Contract, ModelInput};
@@ -10,7 +11,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
-use tract_linalg::multithread::{Executor, multithread_tract_scope};
 use tract_onnx::prelude::*;
 
 /// Rows in a block, for models whose rows do not depend on each other.
@@ -81,7 +81,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
 impl Engine for TractEngine {
     fn run(&self, n: usize, inputs: &[&[f32]]) -> Result<Vec<f32>, String> {
         if self.rows_depend {
-            return multithread_tract_scope(Executor::RayonGlobal, || guarded(|| self.run_rows(n, inputs)));
+            return guarded(|| self.run_rows(n, inputs));
         }
         let width = self.inputs[0].width;
         let blocks: Vec<Vec<f32>> = inputs[0]

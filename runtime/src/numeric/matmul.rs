@@ -27,6 +27,11 @@ impl<'a, T> MatrixView<'a, T> {
         Self { data, rows, cols, row_stride: cols, col_stride: 1 }
     }
 
+    /// Number of rows.
+    pub fn n_rows(&self) -> usize {
+        self.rows
+    }
+
     /// The transpose, without a copy.
     #[must_use]
     pub fn t(self) -> Self {
@@ -40,14 +45,22 @@ impl<'a, T> MatrixView<'a, T> {
     }
 
     /// Rows `start..end`, without a copy.
-    fn rows(self, start: usize, end: usize) -> Self {
+    ///
+    /// # Panics
+    /// If there are no such rows.
+    #[must_use]
+    pub fn rows(self, start: usize, end: usize) -> Self {
         assert!(start <= end && end <= self.rows, "rows {start}..{end} of {}", self.rows);
         let first = (start * self.row_stride).min(self.data.len());
         Self { data: &self.data[first..], rows: end - start, ..self }
     }
 
     /// Columns `start..end`, without a copy.
-    fn cols(self, start: usize, end: usize) -> Self {
+    ///
+    /// # Panics
+    /// If there are no such columns.
+    #[must_use]
+    pub fn cols(self, start: usize, end: usize) -> Self {
         self.t().rows(start, end).t()
     }
 }

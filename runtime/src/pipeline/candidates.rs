@@ -32,9 +32,11 @@ const CLEARLY: f64 = 0.9;
 #[derive(Clone)]
 pub(super) struct Start {
     pub(super) functional_map: Matrix,
+    /// Where the filter follows, those of samples are enough.
     pub(super) map: PointMap,
     pub(super) back: PointMap,
-    pub(super) embedding: Embedding,
+    /// What the maps were found in; none where that were samples alone.
+    pub(super) embedding: Option<Embedding>,
     /// Columns beside the embeddings of refinement.
     pub(super) anchors: Option<Box<[Matrix; 2]>>,
 }
@@ -152,7 +154,7 @@ impl Pair<'_> {
         let [map, back] = embedding.both()?;
         let [phi, psi] = self.bases(self.matcher.k)?;
         let functional_map = crate::fmap::functional_map_of(&map, &phi, &psi)?;
-        Ok(Start { functional_map, map, back, embedding, anchors: None })
+        Ok(Start { functional_map, map, back, embedding: Some(embedding), anchors: None })
     }
 
     /// The functional maps of descriptors at another `k` or so many times the usual weight of the mask.

@@ -23,7 +23,7 @@ pub(super) fn on_inputs(
     source: &Shape,
     target: &Shape,
     map: &PointMap,
-    embedding: &Embedding,
+    embedding: &Embedding<f32>,
     doubt: &[f32],
 ) -> PointMap {
     let surface = EmbeddedSurface::new(target.mesh(), &embedding.target);

@@ -4,6 +4,7 @@ use super::pair::Pair;
 use super::refine::Found;
 use crate::error::Error;
 use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
+use crate::shape::Shape;
 use crate::spectral::{Eigenbasis, Laplacian};
 use std::sync::Arc;
 
@@ -43,11 +44,13 @@ impl Pair<'_> {
     pub(super) fn judge(&self) -> Result<Judge<'_>, Error> {
         let shapes = [&self.source.shape, &self.target.shape];
         let k = SPECTRAL_K.min(shapes[0].max_eigenpairs()).min(shapes[1].max_eigenpairs());
+        let of = |shape: &Shape| (shape.laplacian(), SurfaceFrame::new(shape.mesh()));
+        let (source, target) = rayon::join(|| of(shapes[0]), || of(shapes[1]));
         Ok(Judge {
             pair: self,
             bases: self.bases(k)?,
-            laplacians: shapes.map(|shape| shape.laplacian()),
-            frames: shapes.map(|shape| SurfaceFrame::new(shape.mesh())),
+            laplacians: [source.0, target.0],
+            frames: [source.1, target.1],
         })
     }
 

@@ -36,6 +36,7 @@ use crate::upscale::AdmmInfo;
 use crate::{Matrix, Mesh};
 use pair::Pair;
 use std::path::Path;
+use std::sync::OnceLock;
 
 pub use candidates::Candidate;
 pub use describe_pair::Named;
@@ -319,7 +320,14 @@ impl Matcher {
             .into_iter()
             .try_for_each(|shape| self.check(shape))
             .map_err(|e| e.in_shape(&names))?;
-        let pair = Pair { matcher: self, source, target, names: &names, context: self.context(observer) };
+        let pair = Pair {
+            matcher: self,
+            source,
+            target,
+            names: &names,
+            context: self.context(observer),
+            edges: OnceLock::new(),
+        };
         pair.run(landmarks).map_err(|e| e.in_shape(&names))
     }
 }

@@ -10,10 +10,11 @@ use crate::error::Error;
 use crate::events::{Event, timed};
 use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
 use crate::memory;
-use crate::point_map::search::{AlongEdges, Guesses};
+use crate::point_map::search::AlongEdges;
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::shape::Context;
 use crate::spectral::Eigenbasis;
+use std::sync::OnceLock;
 
 /// Length of the descriptors beside the rows of refinement's embeddings, whose squared length is about 400: on people and animals of
 /// other makers 7 to 14 give the same, 0 and 20 are worse.
@@ -26,6 +27,7 @@ pub(super) struct Pair<'a> {
     /// Both names, for messages.
     pub(super) names: &'a str,
     pub(super) context: Context<'a>,
+    pub(super) edges: OnceLock<AlongEdges>,
 }
 
 impl Pair<'_> {
@@ -100,7 +102,8 @@ impl Pair<'_> {
     /// The bases of source and target, `k` eigenfunctions at unit area.
     pub(super) fn bases(&self, k: usize) -> Result<[Eigenbasis; 2], Error> {
         let of = |described: &DescribedShape| described.shape.unit_basis(k, self.context);
-        Ok([of(self.source)?, of(self.target)?])
+        let (source, target) = rayon::join(|| of(self.source), || of(self.target));
+        Ok([source?, target?])
     }
 
     /// Eigenfunctions that refinement goes up to.
@@ -142,33 +145,36 @@ impl Pair<'_> {
         bases: &[Eigenbasis; 2],
         landmarks: Option<&Landmarks>,
     ) -> Result<Start, Error> {
-        let mut embedding = maps.embedding(comparison, &bases[0], &bases[1])?;
-        if let Some(landmarks) = landmarks {
-            let rows = &embedding.source;
-            let mean_square = rows.data().iter().map(|x| x * x).sum::<f64>() / rows.rows() as f64;
-            let [source, target] = landmarks.anchors(mean_square);
-            embedding = embedding.with_columns(&source, &target);
-        }
         let anchors = self.anchors(Some(descriptors), landmarks);
-        if comparison == Comparison::Joint {
-            let [map, back] = self.first_maps(&embedding)?;
-            return Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors });
+        let functional_map = maps.forth.clone();
+        if comparison == Comparison::Joint && self.begins_with_samples() {
+            let samples = self.edges().samples();
+            let of_samples = [bases[0].at_vertices(samples[0]), bases[1].at_vertices(samples[1])];
+            let embedding = compared(maps, comparison, &of_samples, landmarks, Some(samples))?;
+            let [map, back] = self.edges().maps_of_samples(embedding.matches().map_err(RecoverError::from)?);
+            return Ok(Start { functional_map, map, back, embedding: None, anchors });
         }
-        let map = embedding.forth()?;
-        let back = maps.clone().reversed().point_map(comparison, &bases[1], &bases[0])?;
-        Ok(Start { functional_map: maps.forth.clone(), map, back, embedding, anchors })
+        let embedding = compared(maps, comparison, bases, landmarks, None)?;
+        let [map, back] = match comparison {
+            Comparison::Joint => embedding.both()?,
+            _ => {
+                let back = maps.clone().reversed().point_map(comparison, &bases[1], &bases[0])?;
+                [embedding.forth()?, back]
+            }
+        };
+        Ok(Start { functional_map, map, back, embedding: Some(embedding), anchors })
     }
 
-    /// The point maps of both directions; for the filter, which begins anew from samples, those that samples lead to.
-    fn first_maps(&self, embedding: &Embedding) -> Result<[PointMap; 2], Error> {
-        if self.matcher.refinement(self.is_part()) != Refinement::Wavelet {
-            return Ok(embedding.both()?);
-        }
-        let shapes = [&self.source.shape, &self.target.shape];
-        let areas = shapes.map(|shape| shape.laplacian());
-        let edges = AlongEdges::new(shapes.map(|shape| shape.mesh()), [&areas[0].mass, &areas[1].mass]);
-        let matches = embedding.matches_along(&edges, Guesses::Samples).map_err(RecoverError::from)?;
-        Ok(embedding.point_maps(matches))
+    /// Whether the filter follows, which between large shapes begins with matches of samples.
+    fn begins_with_samples(&self) -> bool {
+        !self.is_part() && self.matcher.refinement(false) == Refinement::Wavelet && self.edges().pays()
+    }
+
+    /// The edges of the working meshes, and samples enough for refinement.
+    pub(super) fn edges(&self) -> &AlongEdges {
+        self.edges.get_or_init(|| {
+            AlongEdges::new([self.source.shape.mesh(), self.target.shape.mesh()], self.refined_k())
+        })
     }
 
     /// Whether a model was trained to tell vertices by its descriptors, not only to make functional maps of them.
@@ -215,6 +221,27 @@ impl Pair<'_> {
             (_, upscaling) => full_by_functional_map(self, &found.map, upscaling, doubt),
         }
     }
+}
+
+/// The embedding of functional maps, with columns of the landmarks beside it; `rows` are the vertices that the bases are at.
+fn compared(
+    maps: &BothMaps,
+    comparison: Comparison,
+    bases: &[Eigenbasis; 2],
+    landmarks: Option<&Landmarks>,
+    rows: Option<[&[u32]; 2]>,
+) -> Result<Embedding, Error> {
+    let embedding = maps.embedding(comparison, &bases[0], &bases[1])?;
+    let Some(landmarks) = landmarks else { return Ok(embedding) };
+    let source = &embedding.source;
+    let mean_square = source.data().iter().map(|x| x * x).sum::<f64>() / source.rows() as f64;
+    let [source, target] = landmarks.anchors(mean_square);
+    Ok(match rows {
+        Some([of_source, of_target]) => {
+            embedding.with_columns(&source.select_rows(of_source), &target.select_rows(of_target))
+        }
+        None => embedding.with_columns(&source, &target),
+    })
 }
 
 /// Rows brought to a length, in double precision; those of no length stay.

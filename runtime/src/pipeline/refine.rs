@@ -6,8 +6,8 @@ use super::{DescribedShape, Refinement};
 use crate::error::Error;
 use crate::point_map::{Comparison, Embedding, PointMap};
 use crate::refine::{
-    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletHints, WaveletOptions, ZoomOutOptions,
-    adjoint_embedding, icp, pmf, wavelet, wavelet_of_part, zoomout,
+    IcpOptions, PmfHints, PmfInfo, PmfOptions, WaveletOptions, ZoomOutOptions, adjoint_embedding, icp, pmf,
+    wavelet_along, wavelet_of_part, zoomout,
 };
 
 /// A map between the working meshes, both ways where both are known.
@@ -15,12 +15,12 @@ pub(super) struct Found {
     pub(super) map: PointMap,
     pub(super) back: Option<PointMap>,
     /// The space that it was found in; none where it comes from no functional map.
-    pub(super) embedding: Option<Embedding>,
+    pub(super) embedding: Option<Embedding<f32>>,
     pub(super) pmf_info: Option<PmfInfo>,
 }
 
 impl Found {
-    fn in_embedding(map: PointMap, back: Option<PointMap>, embedding: Embedding) -> Self {
+    fn in_embedding(map: PointMap, back: Option<PointMap>, embedding: Embedding<f32>) -> Self {
         Self { map, back, embedding: Some(embedding), pmf_info: None }
     }
 }
@@ -31,7 +31,8 @@ impl Pair<'_> {
         match refinement {
             Refinement::None => {
                 let (map, back) = (start.map.clone(), (!self.is_part()).then(|| start.back.clone()));
-                Ok(Found::in_embedding(map, back, start.embedding.clone()))
+                let embedding = start.embedding.as_ref().map(Embedding::single);
+                Ok(Found { map, back, embedding, pmf_info: None })
             }
             Refinement::Icp => self.icp(start),
             Refinement::Zoomout => self.zoomout(start),
@@ -48,7 +49,7 @@ impl Pair<'_> {
         let refine = || icp(&start.functional_map, &source, &target, &IcpOptions::default());
         let refined = self.timed("icp", refine)?;
         let embedding = Embedding::of_one(Comparison::Distance, &refined.functional_map, &source, &target)?;
-        Ok(Found::in_embedding(refined.map, None, embedding))
+        Ok(Found::in_embedding(refined.map, None, embedding.single()))
     }
 
     fn zoomout(&self, start: &Start) -> Result<Found, Error> {
@@ -56,7 +57,7 @@ impl Pair<'_> {
         let options = ZoomOutOptions { part: self.is_part(), ..ZoomOutOptions::default() };
         let refined = self.timed("zoomout", || zoomout(&start.map, &source, &target, &options))?;
         let embedding = adjoint_embedding(&refined.functional_map, &source, &target, None)?;
-        Ok(Found::in_embedding(refined.map, None, embedding))
+        Ok(Found::in_embedding(refined.map, None, embedding.single()))
     }
 
     fn wavelet_of_part(&self, start: &Start) -> Result<Found, Error> {
@@ -67,19 +68,16 @@ impl Pair<'_> {
         let refine = || wavelet_of_part(&start.map, &source, &target, anchors, &options);
         let refined = self.timed("wavelet", refine)?;
         let embedding = adjoint_embedding(&refined.functional_map, &source, &target, anchors)?;
-        Ok(Found::in_embedding(refined.map, None, embedding))
+        Ok(Found::in_embedding(refined.map, None, embedding.single()))
     }
 
     fn wavelet(&self, start: &Start) -> Result<Found, Error> {
         let k = self.refined_k();
         let [source, target] = self.bases(k)?;
         let options = WaveletOptions::coarse_to_fine(self.matcher.k, k);
-        let hints = WaveletHints {
-            anchors: start.anchors.as_deref(),
-            meshes: Some([self.source.shape.mesh(), self.target.shape.mesh()]),
-        };
-        let maps = [&start.map, &start.back];
-        let refined = self.timed("wavelet", || wavelet(maps, &source, &target, hints, &options))?;
+        let (maps, anchors) = ([&start.map, &start.back], start.anchors.as_deref());
+        let refine = || wavelet_along(maps, [&source, &target], anchors, Some(self.edges()), &options);
+        let refined = self.timed("wavelet", refine)?;
         Ok(Found::in_embedding(refined.map, Some(refined.map_back), refined.embedding))
     }
 

@@ -2,11 +2,12 @@
 
 use super::recover::{Comparison, check_shape, cosines, transport};
 use super::search::{
-    AlongEdges, Guesses, NearestRows, Rows, SearchError, mutual_nearest, nearest_rows, squared_norms,
+    NearestRows, Rows, SearchError, inner_product, mutual_nearest, nearest_rows, squared_norms,
 };
 use super::{PointMap, RecoverError};
 use crate::Matrix;
 use crate::spectral::Eigenbasis;
+use rayon::prelude::*;
 
 /// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
 const MOST_PRODUCTS: usize = 1 << 28;
@@ -18,16 +19,43 @@ const MOST_PRODUCTS: usize = 1 << 28;
 /// functional maps miss together, `|C12 phi(x) - psi(y)|^2 + |phi(x) - C21 psi(y)|^2`; it is the same from either side, so that
 /// one embedding gives the point maps of both directions.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Embedding {
+pub struct Embedding<T = f64> {
     /// The rows of the source, `[n_source, d]`; joint: `[Phi C12^T, Phi]`.
-    pub source: Matrix,
+    pub source: Matrix<T>,
     /// The rows of the target, `[n_target, d]`; joint: `[Psi, Psi C21^T]`.
-    pub target: Matrix,
+    pub target: Matrix<T>,
     /// Joint: `Phi (C12^T + C21)`, `[n_source, k_target]`, and `Psi`, whose products are those of the rows in half the width.
-    factors: Option<[Matrix; 2]>,
+    factors: Option<[Matrix<T>; 2]>,
 }
 
-impl Embedding {
+impl Embedding<f32> {
+    /// Of rows `[n_source, d]` and `[n_target, d]`.
+    pub(crate) fn of_single_rows(source: Matrix<f32>, target: Matrix<f32>) -> Self {
+        assert_eq!(source.cols(), target.cols(), "rows in one space");
+        Self { source, target, factors: None }
+    }
+
+    /// The point maps of matches, source to target first, with the cosines between their rows.
+    pub(crate) fn point_maps(&self, [forth, back]: [Vec<u32>; 2]) -> [PointMap; 2] {
+        let squares = |rows: &Matrix<f32>| -> Vec<f32> {
+            (0..rows.rows()).map(|i| inner_product(rows.row(i), rows.row(i))).collect()
+        };
+        let squares = [squares(&self.source), squares(&self.target)];
+        let rows = [&self.source, &self.target];
+        let map = |from: usize, targets: Vec<u32>| {
+            let cosine = |(x, &y): (usize, &u32)| {
+                let lengths = (squares[from][x] * squares[1 - from][y as usize]).sqrt();
+                let product = inner_product(rows[from].row(x), rows[1 - from].row(y as usize));
+                if lengths > 0.0 { (product / lengths).clamp(0.0, 1.0) } else { 0.0 }
+            };
+            let confidence = Some(targets.par_iter().enumerate().map(cosine).collect());
+            PointMap { targets, confidence, points: None, n_target: rows[1 - from].rows() }
+        };
+        [map(0, forth), map(1, back)]
+    }
+}
+
+impl Embedding<f64> {
     /// The joint embedding of the functional maps `forth`, `[k_target, k_source]`, and `back`, `[k_source, k_target]`.
     ///
     /// # Errors
@@ -135,32 +163,23 @@ impl Embedding {
     /// # Errors
     /// If an entry is not finite, or a shape has no vertices.
     pub fn both(&self) -> Result<[PointMap; 2], RecoverError> {
-        Ok(self.point_maps(self.matches()?))
-    }
-
-    /// The point maps of matches, source to target first, with the cosines between their rows.
-    pub(crate) fn point_maps(&self, [forth, back]: [Vec<u32>; 2]) -> [PointMap; 2] {
+        let [forth, back] = self.matches()?;
         let map = |queries: &Matrix, rows: &Matrix, targets: Vec<u32>| {
             let confidence = Some(cosines(queries, rows, &targets));
             PointMap { targets, confidence, points: None, n_target: rows.rows() }
         };
-        [map(&self.source, &self.target, forth), map(&self.target, &self.source, back)]
+        Ok([map(&self.source, &self.target, forth), map(&self.target, &self.source, back)])
     }
 
-    /// Matches from guesses along the edges of both meshes: rows that none of their neighbours is nearer than.
-    ///
-    /// # Errors
-    /// If a row of a shape is not finite.
-    pub(crate) fn matches_along(
-        &self,
-        edges: &AlongEdges,
-        guesses: Guesses,
-    ) -> Result<[Vec<u32>; 2], SearchError> {
-        edges.nearest(self.rounded().each_ref(), guesses)
+    /// The same in single precision.
+    pub(crate) fn single(&self) -> Embedding<f32> {
+        let single = |rows: &Matrix| rows.map(|x| x as f32);
+        let factors = self.factors.as_ref().map(|factors| factors.each_ref().map(single));
+        Embedding { source: single(&self.source), target: single(&self.target), factors }
     }
 
     /// Rows in single precision whose products give the distances.
-    fn rounded(&self) -> [Rows; 2] {
+    fn rounded(&self) -> [Rows<'static>; 2] {
         let [left, right] = match &self.factors {
             Some([left, right]) => [left, right],
             None => [&self.source, &self.target],

@@ -19,6 +19,8 @@ pub use wavelet::{
 };
 pub use zoomout::{ZoomOutInfo, ZoomOutOptions, ZoomOutSamples, zoomout};
 
+pub(crate) use wavelet::wavelet_along;
+
 /// A refined map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refined<Info> {

@@ -6,19 +6,19 @@
 //! functions of unlike frequency fade, the more the farther apart they are, and with them what a wrong match brings in.
 
 mod bands;
+mod by_samples;
 mod part;
-mod single;
+mod sampled;
 
 use super::zoomout::least_squares_map;
 use super::{RefineError, check_bases};
 use crate::Matrix;
 use crate::fmap::{BothMaps, functional_map_of, scale_free_eigenvalues};
 use crate::mesh::Mesh;
-use crate::point_map::search::{AlongEdges, Guesses, mutual_nearest};
+use crate::point_map::search::AlongEdges;
 use crate::point_map::{Embedding, PointMap};
 use crate::spectral::Eigenbasis;
 use bands::filter_mask;
-use single::SingleRounds;
 
 pub use part::wavelet_of_part;
 
@@ -45,9 +45,9 @@ pub struct WaveletHints<'a> {
     /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: descriptors, or
     /// landmarks.
     pub anchors: Option<&'a [Matrix; 2]>,
-    /// The meshes that the bases are of, source and target. With them rounds search along the edges from the match before, which takes
-    /// a tenth of the time; those of the first stage of several, or the first round of a single one, also from what 1000 samples of
-    /// each shape find among each other. Without them, rounds search through all vertices.
+    /// The meshes that the bases are of, source and target. With them, if they have many vertices, rounds match samples only, five for each
+    /// eigenfunction and 1000 or more, and the last round all vertices, along the edges; that takes a tenth of the time. Without them, rounds
+    /// search through all vertices.
     pub meshes: Option<[&'a Mesh; 2]>,
 }
 
@@ -95,7 +95,7 @@ pub struct RefinedBoth<Info> {
     /// The functional maps that they were recovered from.
     pub functional_maps: BothMaps,
     /// The embedding in which the vertices were compared.
-    pub embedding: Embedding,
+    pub embedding: Embedding<f32>,
     /// What the refinement did.
     pub info: Info,
 }
@@ -108,8 +108,8 @@ pub struct RefinedBoth<Info> {
 /// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
 /// cosine of the angle between the two rows of the embedding.
 ///
-/// With the meshes, or between small shapes, matches are found in single precision; the functional maps and the embedding that are
-/// returned are in double precision.
+/// With the meshes, or between small shapes, matches are found in single precision; the functional maps that are returned are in double
+/// precision.
 ///
 /// # Errors
 /// If an option is out of range, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
@@ -121,110 +121,83 @@ pub fn wavelet(
     hints: WaveletHints,
     options: &WaveletOptions,
 ) -> Result<RefinedBoth<WaveletInfo>, RefineError> {
-    check(options)?;
-    check_bases(basis_source, basis_target)?;
     let bases = [basis_source, basis_target];
+    let k = options.stages.iter().map(|stage| stage.k).max().unwrap_or(1);
     check_hints(hints, bases)?;
-    for (map, [from, to]) in maps.into_iter().zip([bases, [basis_target, basis_source]]) {
+    let edges =
+        hints.meshes.map(|meshes| AlongEdges::new(meshes, k.min(basis_source.k()).min(basis_target.k())));
+    wavelet_along(maps, bases, hints.anchors, edges.as_ref(), options)
+}
+
+/// As [`wavelet()`], where the edges of the meshes are known; of the maps no more is needed than the matches of their samples.
+pub(crate) fn wavelet_along(
+    maps: [&PointMap; 2],
+    bases: [&Eigenbasis; 2],
+    anchors: Option<&[Matrix; 2]>,
+    edges: Option<&AlongEdges>,
+    options: &WaveletOptions,
+) -> Result<RefinedBoth<WaveletInfo>, RefineError> {
+    check(options)?;
+    check_bases(bases[0], bases[1])?;
+    check_anchors(anchors, bases)?;
+    for (map, [from, to]) in maps.into_iter().zip([bases, [bases[1], bases[0]]]) {
         // Checks the whole point map, whatever the first round will use of it.
         functional_map_of(map, &from.truncated(1), &to.truncated(1))?;
         if map.targets.iter().all(|&target| target == PointMap::UNMATCHED) {
             return Err(RefineError::NothingMatched);
         }
     }
-    let ks = rounds(&options.stages, basis_source.k().min(basis_target.k()));
-    let mut images = maps.map(|map| map.targets.clone());
-    let rough = if options.stages.len() > 1 { options.stages[0].rounds } else { 1 };
-    let mut search = Search::new(hints.meshes, bases, rough);
-    let mut level = Level::new(bases, hints.anchors, ks[0]);
-    for &k in &ks[..ks.len() - 1] {
-        level = level.at(k);
-        images = level.round(&images, &mut search)?;
-    }
-    level = level.at(ks[ks.len() - 1]);
-    let (functional_maps, embedding) = level.embedded(&images)?;
-    let [map, map_back] = embedding.point_maps(level.round(&images, &mut search)?);
+    let ks = rounds(&options.stages, bases[0].k().min(bases[1].k()));
+    let of_samples =
+        edges.filter(|edges| edges.pays()).and_then(|edges| Some((edges, edges.images_of_samples(maps)?)));
+    let (functional_maps, embedding, matches) = match of_samples {
+        Some((edges, images)) => by_samples::refine(images, bases, anchors, edges, &ks)?,
+        None => refine_everywhere(maps, bases, anchors, &ks)?,
+    };
+    let [map, map_back] = embedding.point_maps(matches);
     Ok(RefinedBoth { map, map_back, functional_maps, embedding, info: WaveletInfo { rounds: ks } })
 }
 
-/// How the vertices are matched in an embedding.
-struct Search {
-    /// The edges to search along; without them all vertices are searched through.
-    edges: Option<AlongEdges>,
-    /// First rounds that are left.
-    rough: usize,
+/// What rounds lead to: the last functional maps, their embedding, and the matches in it.
+type Found = (BothMaps, Embedding<f32>, [Vec<u32>; 2]);
+
+/// Rounds in which every vertex is matched anew among all of the other shape.
+fn refine_everywhere(
+    maps: [&PointMap; 2],
+    bases: [&Eigenbasis; 2],
+    anchors: Option<&[Matrix; 2]>,
+    ks: &[usize],
+) -> Result<Found, RefineError> {
+    let round = |images: [&[u32]; 2], k: usize| -> Result<Found, RefineError> {
+        let bases = bases.map(|basis| basis.truncated(k));
+        let functional_maps = filtered_maps(images, &bases)?;
+        let (forth, back) = (&functional_maps.forth, &functional_maps.back);
+        let embedding = Embedding::joint_beside(forth, back, bases.each_ref(), anchors)?;
+        let matches = embedding.matches()?;
+        Ok((functional_maps, embedding.single(), matches))
+    };
+    let mut found = round(maps.map(|map| &map.targets[..]), ks[0])?;
+    for &k in &ks[1..] {
+        found = round(found.2.each_ref().map(|images| &images[..]), k)?;
+    }
+    Ok(found)
 }
 
-impl Search {
-    fn new(meshes: Option<[&Mesh; 2]>, bases: [&Eigenbasis; 2], rough: usize) -> Self {
-        let edges = meshes.map(|meshes| AlongEdges::new(meshes, bases.map(|basis| &basis.mass[..])));
-        Self { edges, rough }
-    }
-
-    /// What the next round begins with.
-    fn guesses<'a>(&mut self, before: &'a [Vec<u32>; 2]) -> Guesses<'a> {
-        let rough = self.rough > 0;
-        self.rough = self.rough.saturating_sub(1);
-        if rough { Guesses::MatchesAndSamples(before) } else { Guesses::Matches(before) }
-    }
+/// The filtered functional maps, `[k, k]`, of a pair of point maps.
+fn filtered_maps(
+    [forth, back]: [&[u32]; 2],
+    [source, target]: &[Eigenbasis; 2],
+) -> Result<BothMaps, RefineError> {
+    let (c12, c21) = rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
+    let mask = filter_mask(&scale_free_eigenvalues(source), &scale_free_eigenvalues(target));
+    Ok(filtered(&mask, &c12?, &c21?))
 }
 
-/// What rounds need of both shapes: `k` eigenfunctions, and columns beside the embedding.
-struct Level<'a> {
-    k: usize,
-    bases: [&'a Eigenbasis; 2],
-    anchors: Option<&'a [Matrix; 2]>,
-    mask: Matrix,
-    single: SingleRounds,
-}
-
-impl<'a> Level<'a> {
-    fn new(bases: [&'a Eigenbasis; 2], anchors: Option<&'a [Matrix; 2]>, k: usize) -> Self {
-        let [source, target] = bases.map(|basis| scale_free_eigenvalues(basis)[..k].to_vec());
-        let mask = filter_mask(&source, &target);
-        let single = SingleRounds::new(bases, k, &mask, anchors);
-        Self { k, bases, anchors, mask, single }
-    }
-
-    /// The same, with `k` eigenfunctions.
-    fn at(self, k: usize) -> Self {
-        if self.k == k { self } else { Self::new(self.bases, self.anchors, k) }
-    }
-
-    /// The matches of a round; in single precision where all vertices had one, and along the edges or between small shapes.
-    fn round(&self, images: &[Vec<u32>; 2], search: &mut Search) -> Result<[Vec<u32>; 2], RefineError> {
-        let guesses = search.guesses(images);
-        let complete = images.iter().flatten().all(|&image| image != PointMap::UNMATCHED);
-        let small = Embedding::is_small(self.bases[0].n(), self.bases[1].n());
-        Ok(match &search.edges {
-            Some(edges) if complete => edges.nearest(self.single.embedded(images).each_ref(), guesses)?,
-            None if complete && small => mutual_nearest(self.single.embedded(images).each_ref())?,
-            _ => self.embedded(images)?.1.matches()?,
-        })
-    }
-
-    /// The filtered functional maps of a pair of point maps, and the embedding in which they compare the vertices.
-    fn embedded(&self, images: &[Vec<u32>; 2]) -> Result<(BothMaps, Embedding), RefineError> {
-        let bases = self.bases.map(|basis| basis.truncated(self.k));
-        let maps = self.filtered_maps(images, &bases)?;
-        let embedding = Embedding::joint_beside(&maps.forth, &maps.back, bases.each_ref(), self.anchors)?;
-        Ok((maps, embedding))
-    }
-
-    /// The filtered functional maps, `[k, k]`, of a pair of point maps.
-    fn filtered_maps(
-        &self,
-        [forth, back]: &[Vec<u32>; 2],
-        [source, target]: &[Eigenbasis; 2],
-    ) -> Result<BothMaps, RefineError> {
-        let (c12, c21) = rayon::join(|| pull_back(back, target, source), || pull_back(forth, source, target));
-        let filtered = |c: &Matrix, weight: &dyn Fn(usize, usize) -> f64| {
-            Matrix::from_fn(c.rows(), c.cols(), |i, j| weight(i, j) * c[(i, j)])
-        };
-        Ok(BothMaps {
-            forth: filtered(&c12?, &|i, j| self.mask[(i, j)]),
-            back: filtered(&c21?, &|i, j| self.mask[(j, i)]),
-        })
+/// What the filter leaves of functional maps forth and back; the mask is that of maps forth, `[k_target, k_source]`.
+fn filtered(mask: &Matrix, forth: &Matrix, back: &Matrix) -> BothMaps {
+    BothMaps {
+        forth: Matrix::from_fn(forth.rows(), forth.cols(), |i, j| mask[(i, j)] * forth[(i, j)]),
+        back: Matrix::from_fn(back.rows(), back.cols(), |i, j| mask[(j, i)] * back[(i, j)]),
     }
 }
 
@@ -257,12 +230,12 @@ fn rounds(stages: &[WaveletStage], k_available: usize) -> Vec<usize> {
 
 fn check_hints(hints: WaveletHints, [source, target]: [&Eigenbasis; 2]) -> Result<(), RefineError> {
     let (n_source, n_target) = (source.n(), target.n());
-    if let Some(found) = hints.meshes.map(|meshes| meshes.map(|mesh| mesh.n_vertices()))
-        && found != [n_source, n_target]
-    {
-        return Err(RefineError::Meshes { found, n_source, n_target });
+    match hints.meshes.map(|meshes| meshes.map(|mesh| mesh.n_vertices())) {
+        Some(found) if found != [n_source, n_target] => {
+            Err(RefineError::Meshes { found, n_source, n_target })
+        }
+        _ => Ok(()),
     }
-    check_anchors(hints.anchors, [source, target])
 }
 
 fn check_anchors(anchors: Option<&[Matrix; 2]>, bases: [&Eigenbasis; 2]) -> Result<(), RefineError> {

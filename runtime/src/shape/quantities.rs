@@ -24,7 +24,7 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 /// Versions of the quantities: raise one whenever its numbers or their encoding change.
 const EIGENBASIS_VERSION: u32 = 1;
 const SHOT_VERSION: u32 = 1;
-const GRADIENTS_VERSION: u32 = 1;
+const GRADIENTS_VERSION: u32 = 2;
 
 /// What was computed so far.
 #[derive(Clone, Debug, Default)]
@@ -102,12 +102,13 @@ impl Shape {
             Some(gradients) => gradients,
             None => {
                 let basis = self.unit_basis(k, context)?;
-                let EigenGradients { x, y } =
+                let mut gradients =
                     timed(context.observer, &self.name, "gradients", || eigen_gradients(self.mesh(), &basis));
                 // Lengths are in units of sqrt(area).
                 let unit = self.unit_area().sqrt();
-                let gradients =
-                    EigenGradients { x: x.map(|value| value * unit), y: y.map(|value| value * unit) };
+                for component in [&mut gradients.x, &mut gradients.y] {
+                    component.data_mut().iter_mut().for_each(|value| *value *= unit);
+                }
                 let mut out = Encoder::default();
                 out.matrix(&gradients.x).matrix(&gradients.y);
                 self.keep("gradients", key, &out.finish(), context)?;

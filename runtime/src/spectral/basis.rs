@@ -1,6 +1,7 @@
 //! The truncated Laplacian eigenbasis of a shape.
 
 use crate::Matrix;
+use crate::numeric::vectorized;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
 use rayon::prelude::*;
@@ -68,8 +69,28 @@ impl Eigenbasis {
     pub fn in_unit(&self, area: f64, k: usize) -> Self {
         Self {
             eigenvalues: self.eigenvalues[..k].iter().map(|lambda| lambda * area).collect(),
-            eigenvectors: self.eigenvectors.first_cols(k).map(|x| x * area.sqrt()),
+            eigenvectors: self.scaled_eigenvectors(k, area.sqrt()),
             mass: self.mass.iter().map(|m| m / area).collect(),
+        }
+    }
+
+    /// The first `k` eigenvectors times a factor, `[n, k]`.
+    fn scaled_eigenvectors(&self, k: usize, factor: f64) -> Matrix {
+        let mut scaled = Vec::with_capacity(self.n() * k);
+        vectorized(|| {
+            for i in 0..self.n() {
+                scaled.extend(self.eigenvectors.row(i)[..k].iter().map(|x| x * factor));
+            }
+        });
+        Matrix::from_vec(self.n(), k, scaled)
+    }
+
+    /// The basis at some of the vertices, in this order: their values and masses.
+    pub(crate) fn at_vertices(&self, vertices: &[u32]) -> Self {
+        Self {
+            eigenvalues: self.eigenvalues.clone(),
+            eigenvectors: self.eigenvectors.select_rows(vertices),
+            mass: vertices.iter().map(|&v| self.mass[v as usize]).collect(),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::Eigenbasis;
 use crate::Matrix;
 use crate::mesh::{Mesh, vec3};
+use crate::numeric::vectorized;
 use rayon::prelude::*;
 
 /// The gradients of the eigenfunctions of a shape at its vertices, in a tangent frame at each vertex.
@@ -32,13 +33,15 @@ pub fn eigen_gradients(mesh: &Mesh, basis: &Eigenbasis) -> EigenGradients {
     if k > 0 {
         let rows = x.data_mut().par_chunks_mut(k).zip(y.data_mut().par_chunks_mut(k));
         rows.enumerate().for_each(|(vertex, (x, y))| {
-            for &(neighbor, [along_x, along_y]) in stencils.of(vertex) {
-                let values = basis.eigenvectors.row(neighbor as usize);
-                for ((x, y), value) in x.iter_mut().zip(y.iter_mut()).zip(values) {
-                    *x += along_x * value;
-                    *y += along_y * value;
+            vectorized(|| {
+                for &(neighbor, [along_x, along_y]) in stencils.of(vertex) {
+                    let values = basis.eigenvectors.row(neighbor as usize);
+                    for ((x, y), value) in x.iter_mut().zip(y.iter_mut()).zip(values) {
+                        *x += along_x * value;
+                        *y += along_y * value;
+                    }
                 }
-            }
+            });
         });
     }
     EigenGradients { x, y }
@@ -73,6 +76,7 @@ impl Stencils {
                 for &face in &around[vertex] {
                     stencils.add_face(mesh, face as usize, frame, areas[vertex]);
                 }
+                stencils.merge_last();
             }
             stencils.first.push(stencils.entries.len());
         }
@@ -90,6 +94,20 @@ impl Stencils {
             let share = vec3::scale(vec3::cross(normal, opposite), 0.5 / around);
             self.entries.push((mesh.faces()[face][i], frame.map(|axis| vec3::dot(axis, share))));
         }
+    }
+
+    /// Adds up what each vertex weighs in the stencil that was begun last.
+    fn merge_last(&mut self) {
+        let start = self.first[self.first.len() - 1];
+        let mut merged: Vec<(u32, [f64; 2])> = Vec::with_capacity(8);
+        for &(vertex, [x, y]) in &self.entries[start..] {
+            match merged.iter_mut().find(|(known, _)| *known == vertex) {
+                Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
+                None => merged.push((vertex, [x, y])),
+            }
+        }
+        self.entries.truncate(start);
+        self.entries.extend(merged);
     }
 
     fn of(&self, vertex: usize) -> &[(u32, [f64; 2])] {

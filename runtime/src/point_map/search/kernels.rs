@@ -65,8 +65,21 @@ impl Kernels {
         squared_distance, (a: &[f64], b: &[f64]) -> f64
     );
     dispatched!(
+        /// Squared distance of two rows in single precision.
+        squared_distance_single, (a: &[f32], b: &[f32]) -> f32
+    );
+    dispatched!(
         /// Inner products of a vector `[d]` with rows `[rows, d]`.
         inner_products, (rows: &[f32], vector: &[f32], products: &mut [f32])
+    );
+    dispatched!(
+        /// The lowest `squares[j] - products[j]`, and the lowest `j` that has it; infinity and 0 where none is below infinity.
+        lowest_difference, (squares: &[f32], products: &[f32]) -> (f32, u32)
+    );
+    dispatched!(
+        /// Where `square - products[j]` is below `values[j]`, takes its place, and `index` that of `indices[j]`.
+        lower_differences,
+        (values: &mut [f32], indices: &mut [u32], of_row: (f32, u32), products: &[f32])
     );
     dispatched!(
         /// Inner products of one query `[d]` with the columns of a frame `[d, LANES]`.
@@ -135,26 +148,81 @@ fn add_product<const FUSED: bool>(sum: &mut [f32; LANES], row: &[f32; LANES], en
     }
 }
 
+/// Adds up `term(a, b, sum)` in thirty-two interleaved partial sums.
+#[inline(always)]
+fn sum32(a: &[f32], b: &[f32], term: impl Fn(f32, f32, f32) -> f32) -> f32 {
+    let (a_blocks, a_rest) = a.as_chunks::<32>();
+    let (b_blocks, b_rest) = b.as_chunks::<32>();
+    let mut sums = [0.0; 32];
+    for (x, y) in a_blocks.iter().zip(b_blocks) {
+        for lane in 0..32 {
+            sums[lane] = term(x[lane], y[lane], sums[lane]);
+        }
+    }
+    for (lane, (&x, &y)) in a_rest.iter().zip(b_rest).enumerate() {
+        sums[lane] = term(x, y, sums[lane]);
+    }
+    for half in [16, 8, 4, 2, 1] {
+        for lane in 0..half {
+            sums[lane] += sums[lane + half];
+        }
+    }
+    sums[0]
+}
+
+#[inline(always)]
+fn squared_distance_single<const FUSED: bool>(a: &[f32], b: &[f32]) -> f32 {
+    sum32(a, b, |x, y, sum| multiply_add::<FUSED>(x - y, x - y, sum))
+}
+
 #[inline(always)]
 fn inner_products<const FUSED: bool>(rows: &[f32], vector: &[f32], products: &mut [f32]) {
-    let (vector_blocks, vector_rest) = vector.as_chunks::<32>();
     for (row, product) in rows.chunks_exact(vector.len().max(1)).zip(products) {
-        let (row_blocks, row_rest) = row.as_chunks::<32>();
-        let mut sums = [0.0; 32];
-        for (x, y) in row_blocks.iter().zip(vector_blocks) {
-            for lane in 0..32 {
-                sums[lane] = multiply_add::<FUSED>(x[lane], y[lane], sums[lane]);
-            }
+        *product = sum32(row, vector, multiply_add::<FUSED>);
+    }
+}
+
+#[inline(always)]
+fn lowest_difference<const FUSED: bool>(squares: &[f32], products: &[f32]) -> (f32, u32) {
+    const WIDE: usize = 2 * LANES;
+    let (mut values, mut chunks) = ([f32::INFINITY; WIDE], [0u32; WIDE]);
+    let ((squares, squares_rest), (products, products_rest)) =
+        (squares.as_chunks::<WIDE>(), products.as_chunks::<WIDE>());
+    for (chunk, (squares, products)) in squares.iter().zip(products).enumerate() {
+        for lane in 0..WIDE {
+            let value = squares[lane] - products[lane];
+            let better = value < values[lane];
+            values[lane] = if better { value } else { values[lane] };
+            chunks[lane] = if better { chunk as u32 } else { chunks[lane] };
         }
-        for (lane, (&x, &y)) in row_rest.iter().zip(vector_rest).enumerate() {
-            sums[lane] = multiply_add::<FUSED>(x, y, sums[lane]);
+    }
+    let mut lowest = (f32::INFINITY, 0);
+    for lane in 0..WIDE {
+        let found = (values[lane], chunks[lane] * WIDE as u32 + lane as u32);
+        if values[lane] < f32::INFINITY && found < lowest {
+            lowest = found;
         }
-        for half in [16, 8, 4, 2, 1] {
-            for lane in 0..half {
-                sums[lane] += sums[lane + half];
-            }
+    }
+    for (i, (square, product)) in squares_rest.iter().zip(products_rest).enumerate() {
+        if square - product < lowest.0 {
+            lowest = (square - product, (squares.len() * WIDE + i) as u32);
         }
-        *product = sums[0];
+    }
+    lowest
+}
+
+#[inline(always)]
+fn lower_differences<const FUSED: bool>(
+    values: &mut [f32],
+    indices: &mut [u32],
+    (square, index): (f32, u32),
+    products: &[f32],
+) {
+    for ((value, best), product) in values.iter_mut().zip(indices).zip(products) {
+        let found = square - product;
+        let better = found < *value;
+        *value = if better { found } else { *value };
+        *best = if better { index } else { *best };
     }
 }
 

@@ -23,7 +23,8 @@ mod mutual;
 mod query;
 
 use crate::Matrix;
-pub(crate) use along_edges::{AlongEdges, Guesses};
+use crate::numeric::{Real, vectorized};
+pub(crate) use along_edges::AlongEdges;
 use bisect::Partition;
 use kernels::Kernels;
 use leaves::Leaves;
@@ -140,6 +141,18 @@ pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     Kernels::detect().squared_distance(a, b)
 }
 
+/// The squared Euclidean distance of two vectors of one length, in single precision.
+pub(crate) fn squared_distance_single(a: &[f32], b: &[f32]) -> f32 {
+    Kernels::detect().squared_distance_single(a, b)
+}
+
+/// The inner product of two vectors of one length, in single precision.
+pub(crate) fn inner_product(a: &[f32], b: &[f32]) -> f32 {
+    let mut product = [0.0];
+    Kernels::detect().inner_products(a, b, &mut product);
+    product[0]
+}
+
 /// Points in a leaf, at most, and queries in a block: the cost of looking at all leaves falls with it, the
 /// cost of looking into those that are not excluded grows.
 fn leaf_size(n_targets: usize) -> usize {
@@ -154,11 +167,28 @@ fn unit_scale(points: &Matrix) -> f64 {
     if exponent.is_finite() { (-exponent.ceil().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
 }
 
-fn check_finite<T: Copy + Into<f64>>(rows: &Matrix<T>, role: &'static str) -> Result<(), SearchError> {
-    match rows.data().iter().position(|&x| !x.into().is_finite()) {
+fn check_finite<T: Real>(rows: &Matrix<T>, role: &'static str) -> Result<(), SearchError> {
+    if vectorized(|| all_finite(rows.data())) {
+        return Ok(());
+    }
+    match rows.data().iter().position(|&x| !x.to_double().is_finite()) {
         Some(entry) => Err(SearchError::NotFinite { role, row: entry / rows.cols() }),
         None => Ok(()),
     }
+}
+
+/// Whether no number is NaN or infinite: zero times such a one is NaN, and stays so in a sum.
+#[inline(always)]
+fn all_finite<T: Real>(numbers: &[T]) -> bool {
+    let (chunks, rest) = numbers.as_chunks::<32>();
+    let mut sums = [T::ZERO; 32];
+    for chunk in chunks {
+        for (sum, &number) in sums.iter_mut().zip(chunk) {
+            *sum += number * T::ZERO;
+        }
+    }
+    rest.iter().for_each(|&number| sums[0] += number * T::ZERO);
+    sums.iter().all(|&sum| sum == T::ZERO)
 }
 
 #[cfg(test)]

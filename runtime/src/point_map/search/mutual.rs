@@ -4,16 +4,16 @@
 //! neighbours of one direction, its columns those of the other. That is faster than two searches where both directions are
 //! wanted and the sets are not large; distances that agree to single precision may be taken for one another.
 
+use super::kernels::Kernels;
 use super::{SearchError, check_finite};
 use crate::Matrix;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Rows of either set in one product: what fits the cache.
 const ROWS: usize = 192;
 const COLUMNS: usize = 256;
-/// Accumulators along a row of the product, which the compiler keeps in vector registers.
-const LANES: usize = 16;
 
 /// For each row `a_x` of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round; of equally
 /// near ones the lowest. The same for any number of threads.
@@ -24,12 +24,10 @@ pub(crate) fn mutual_nearest([a, b]: [&Rows; 2]) -> Result<[Vec<u32>; 2], Search
     check_pair([a, b])?;
     let blocks: Vec<Block> =
         (0..a.n().div_ceil(ROWS)).into_par_iter().map(|block| Block::new(a, b, block * ROWS)).collect();
-    let forth = blocks.iter().flat_map(|block| block.forth.iter().map(|best| best.index)).collect();
-    let mut back = vec![Best::NONE; b.n()];
-    for block in &blocks {
-        back.iter_mut().zip(&block.back).for_each(|(best, found)| best.improve(*found));
-    }
-    Ok([forth, back.iter().map(|best| best.index).collect()])
+    let forth = blocks.iter().flat_map(|block| block.forth.indices.iter().copied()).collect();
+    let mut back = Lowest::none(b.n());
+    blocks.iter().for_each(|block| back.improve(&block.back));
+    Ok([forth, back.indices])
 }
 
 /// Whether two sets can be compared.
@@ -51,14 +49,14 @@ pub(crate) fn squared_norms(rows: &Matrix) -> Vec<f64> {
 
 /// Rows in single precision, `[n, d]`, with half of their squared norms, or of what takes their place: the squared distance of a row
 /// `a_x` of one set and `b_y` of another is `2 (s_x + t_y - a_x . b_y)`.
-pub(crate) struct Rows {
-    entries: Matrix<f32>,
+pub(crate) struct Rows<'a> {
+    entries: Cow<'a, Matrix<f32>>,
     half_squares: Vec<f32>,
 }
 
-impl Rows {
+impl<'a> Rows<'a> {
     /// Rows `[n, d]` and half of their squared norms, `[n]`.
-    pub(crate) fn new(entries: Matrix<f32>, half_squares: Vec<f32>) -> Self {
+    pub(crate) fn new(entries: Cow<'a, Matrix<f32>>, half_squares: Vec<f32>) -> Self {
         assert_eq!(entries.rows(), half_squares.len(), "one square for each row");
         Self { entries, half_squares }
     }
@@ -66,7 +64,7 @@ impl Rows {
     /// Rows rounded, with their squared norms.
     pub(crate) fn rounded(rows: &Matrix, squares: &[f64]) -> Self {
         let half_squares = squares.iter().map(|square| (square / 2.0) as f32).collect();
-        Self::new(rows.map(|x| x as f32), half_squares)
+        Self::new(Cow::Owned(rows.map(|x| x as f32)), half_squares)
     }
 
     pub(super) fn n(&self) -> usize {
@@ -74,9 +72,9 @@ impl Rows {
     }
 
     /// Some of the rows, in this order.
-    pub(super) fn select(&self, rows: &[u32]) -> Self {
+    pub(super) fn select(&self, rows: &[u32]) -> Rows<'static> {
         let half_squares = rows.iter().map(|&i| self.half_squares[i as usize]).collect();
-        Self::new(self.entries.select_rows(rows), half_squares)
+        Rows::new(Cow::Owned(self.entries.select_rows(rows)), half_squares)
     }
 
     pub(super) fn row(&self, i: usize) -> &[f32] {
@@ -92,33 +90,39 @@ impl Rows {
     }
 }
 
-/// The lowest value so far of `|y|^2 / 2 - x . y`, which orders the distances to `x`.
-#[derive(Clone, Copy)]
-struct Best {
-    value: f32,
-    index: u32,
+/// For each row the lowest value so far of `|y|^2 / 2 - x . y`, which orders the distances to `x`, and whose it is.
+struct Lowest {
+    values: Vec<f32>,
+    indices: Vec<u32>,
 }
 
-impl Best {
-    const NONE: Self = Self { value: f32::INFINITY, index: 0 };
+impl Lowest {
+    fn none(n: usize) -> Self {
+        Self { values: vec![f32::INFINITY; n], indices: vec![0; n] }
+    }
 
-    fn improve(&mut self, found: Self) {
-        if found.value < self.value {
-            *self = found;
+    fn improve_at(&mut self, i: usize, value: f32, index: u32) {
+        if value < self.values[i] {
+            (self.values[i], self.indices[i]) = (value, index);
         }
+    }
+
+    fn improve(&mut self, other: &Self) {
+        (0..self.values.len()).for_each(|i| self.improve_at(i, other.values[i], other.indices[i]));
     }
 }
 
 /// What some rows of `a` find in all of `b`, and all of `b` in them.
 struct Block {
-    forth: Vec<Best>,
-    back: Vec<Best>,
+    forth: Lowest,
+    back: Lowest,
 }
 
 impl Block {
     fn new(a: &Rows, b: &Rows, first: usize) -> Self {
+        let kernels = Kernels::detect();
         let rows = ROWS.min(a.n() - first);
-        let mut block = Self { forth: vec![Best::NONE; rows], back: vec![Best::NONE; b.n()] };
+        let mut block = Self { forth: Lowest::none(rows), back: Lowest::none(b.n()) };
         let mut products = vec![0.0; rows * COLUMNS];
         for start in (0..b.n()).step_by(COLUMNS) {
             let columns = COLUMNS.min(b.n() - start);
@@ -132,46 +136,16 @@ impl Block {
                 Par::Seq,
             );
             let b_squares = &b.half_squares[start..start + columns];
+            let (values, indices) = (&mut block.back.values[start..], &mut block.back.indices[start..]);
             for (i, row) in products.chunks_exact(columns).enumerate() {
-                block.forth[i].improve(lowest(row, b_squares, start as u32));
-                let (square, index) = (a.half_squares[first + i], (first + i) as u32);
-                for (best, product) in block.back[start..start + columns].iter_mut().zip(row) {
-                    let value = square - product;
-                    let better = value < best.value;
-                    best.value = if better { value } else { best.value };
-                    best.index = if better { index } else { best.index };
-                }
+                let (value, index) = kernels.lowest_difference(b_squares, row);
+                block.forth.improve_at(i, value, start as u32 + index);
+                let of_a = (a.half_squares[first + i], (first + i) as u32);
+                kernels.lower_differences(&mut values[..columns], &mut indices[..columns], of_a, row);
             }
         }
         block
     }
-}
-
-/// The lowest `square - product`, and where; indices count from `start`.
-fn lowest(products: &[f32], squares: &[f32], start: u32) -> Best {
-    let mut values = [f32::INFINITY; LANES];
-    let mut chunks = [0u32; LANES];
-    let whole = products.chunks_exact(LANES).zip(squares.chunks_exact(LANES));
-    for (chunk, (products, squares)) in whole.enumerate() {
-        for lane in 0..LANES {
-            let value = squares[lane] - products[lane];
-            let better = value < values[lane];
-            values[lane] = if better { value } else { values[lane] };
-            chunks[lane] = if better { chunk as u32 } else { chunks[lane] };
-        }
-    }
-    let mut best = Best::NONE;
-    for lane in 0..LANES {
-        let found = Best { value: values[lane], index: start + chunks[lane] * LANES as u32 + lane as u32 };
-        if (found.value, found.index) < (best.value, best.index) || best.value == f32::INFINITY {
-            best = found;
-        }
-    }
-    let tail = products.len() / LANES * LANES;
-    for (i, (product, square)) in products.iter().zip(squares).enumerate().skip(tail) {
-        best.improve(Best { value: square - product, index: start + i as u32 });
-    }
-    best
 }
 
 #[cfg(test)]
