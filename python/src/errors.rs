@@ -36,19 +36,19 @@ impl From<Failure> for PyErr {
     fn from(failure: Failure) -> Self {
         match failure {
             Failure::Library(error) => of_library(&error),
-            Failure::Said(text) => Error::new_err(text),
+            Failure::Said(text) => Error::new_err(with_arguments(&text)),
         }
     }
 }
 
 fn of_library(error: &fmnet::Error) -> PyErr {
     match innermost(error) {
-        fmnet::Error::Io(io) => of_io(io).unwrap_or_else(|| Error::new_err(error.to_string())),
+        fmnet::Error::Io(io) => of_io(io).unwrap_or_else(|| Error::new_err(with_arguments(&error.to_string()))),
         fmnet::Error::Network(NetworkError::Read { path, .. }) => match std::fs::metadata(path) {
             Err(source) => system_error(path, &source),
             Ok(_) => PyOSError::new_err(error.to_string()),
         },
-        _ => Error::new_err(error.to_string()),
+        _ => Error::new_err(with_arguments(&error.to_string())),
     }
 }
 
@@ -93,6 +93,42 @@ pub(crate) fn said(error: impl std::fmt::Display) -> Failure {
 
 /// A Python warning, at the line of the caller.
 pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
-    let text = std::ffi::CString::new(text.replace('\0', " ")).map_err(wrong)?;
+    let text = std::ffi::CString::new(with_arguments(text).replace('\0', " ")).map_err(wrong)?;
     PyErr::warn(py, &py.get_type::<FmnetWarning>(), &text, 1)
+}
+
+/// Options of the program that are arguments here, and whether a value follows them.
+const ARGUMENTS: [(&str, bool); 9] = [
+    ("--effort", true),
+    ("--refine", true),
+    ("--backend", true),
+    ("--decimate", true),
+    ("--subdivide", true),
+    ("-k", true),
+    ("--landmarks", false),
+    ("--adapt", false),
+    ("--partial", false),
+];
+
+/// A text that names options of the program, with the arguments of functions in their place: `--effort high` becomes `effort="high"`.
+fn with_arguments(text: &str) -> String {
+    let mut words = text.split(' ');
+    let mut said: Vec<String> = Vec::new();
+    while let Some(word) = words.next() {
+        let bare = word.trim_start_matches('(').trim_end_matches([')', ',', ';', '.']);
+        let Some((option, takes_value)) = ARGUMENTS.iter().find(|(option, _)| *option == bare) else {
+            said.push(word.to_string());
+            continue;
+        };
+        let mut argument = word.replacen(option, option.trim_start_matches('-'), 1);
+        if *takes_value && word.ends_with(bare) {
+            let value = words.next().unwrap_or_default();
+            let end = value.find([')', ',', ';', '.', '\n']).unwrap_or(value.len());
+            let (value, tail) = value.split_at(end);
+            let is_word = value.starts_with(|c: char| c.is_ascii_lowercase());
+            argument += &if is_word { format!("=\"{value}\"{tail}") } else { format!("={value}{tail}") };
+        }
+        said.push(argument);
+    }
+    said.join(" ")
 }

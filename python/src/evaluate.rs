@@ -3,9 +3,10 @@
 use crate::arrays::{integers, out_matrix, view};
 use crate::errors::{said, wrong};
 use crate::input::Input;
+use crate::result::Match;
 use crate::run::run;
 use crate::stages::in_map;
-use fmnet::eval::{ErrorSummary, GroundTruth, geodesic_errors, symmetric_geodesic_errors};
+use fmnet::eval::{ErrorSummary, GroundTruth, geodesic_errors, surface_errors, symmetric_geodesic_errors};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::memory;
 use numpy::{PyArray1, PyArrayMethods};
@@ -62,6 +63,7 @@ pub(crate) fn geodesic_distances<'py>(
 pub(crate) struct Evaluation {
     errors: Vec<f32>,
     summary: ErrorSummary,
+    on_surface: Option<f64>,
     mirrored: bool,
 }
 
@@ -84,6 +86,13 @@ impl Evaluation {
     #[getter]
     fn mean(&self) -> f64 {
         self.summary.mean
+    }
+
+    /// float or None : Mean error of the points on the surface that a :class:`Match` has (``barycentric``), finer than its vertices; None
+    /// for plain arrays, and where the mirrored truth counts.
+    #[getter]
+    fn mean_on_surface(&self) -> Option<f64> {
+        self.on_surface
     }
 
     /// float : Largest error.
@@ -157,7 +166,8 @@ pub(crate) fn evaluate(
     let n_target = target.n_vertices();
     let own = targets.getattr_opt("targets")?;
     let n_source = own.as_ref().unwrap_or(targets).len()?;
-    let map = in_map(targets, n_source, n_target, "targets")?;
+    let mut map = in_map(targets, n_source, n_target, "targets")?;
+    map.points = targets.cast::<Match>().ok().and_then(|found| found.get().inner.map.points.clone());
     let truth = in_map(truth, n_source, n_target, "truth")?;
     let mirrored =
         symmetric_truth.map(|truth| in_map(truth, n_source, n_target, "symmetric_truth")).transpose()?;
@@ -182,6 +192,14 @@ pub(crate) fn evaluate(
             .iter()
             .zip(&errors)
             .for_each(|(&(source, _), &error)| of_vertex[source as usize] = error);
-        Ok(Evaluation { summary: ErrorSummary::new(&errors, area), errors: of_vertex, mirrored: is_mirrored })
+        let on_surface = match map.points.is_some() && !is_mirrored {
+            true => {
+                let errors = surface_errors(&map, &pairs, &target, &solver).map_err(said)?;
+                Some(ErrorSummary::new(&errors, area).mean)
+            }
+            false => None,
+        };
+        let summary = ErrorSummary::new(&errors, area);
+        Ok(Evaluation { summary, on_surface, errors: of_vertex, mirrored: is_mirrored })
     })
 }

@@ -88,6 +88,14 @@ def test_warnings_are_warnings_of_python(mesh):
             matcher.describe(mesh)
 
 
+def test_messages_name_arguments(mesh):
+    with pytest.warns(fmnet.FmnetWarning, match=r"\(subdivide=N\)$"):
+        fmnet.Matcher(shot_radius=0.01, **SHOT).describe(mesh)
+    part = fmnet.Matcher(descriptor="shot", k=10, subdivide="off", refine="icp")
+    with pytest.raises(fmnet.Error, match='with refine="zoomout"'):
+        part.match(mesh, mesh, partial=True)
+
+
 def test_warnings_of_a_file(mesh, tmp_path):
     path = tmp_path / "a.ply"
     path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n")

@@ -1,5 +1,7 @@
 """Single stages on plain arrays."""
 
+import json
+
 import fmnet
 import numpy as np
 import pytest
@@ -126,6 +128,10 @@ def test_the_evaluation_of_the_program(demo, program, tmp_path):
     names = percent.dtype.names
     shares = [100 * np.mean(found.errors <= limit) for limit in percent[names[0]]]
     np.testing.assert_allclose(percent[names[1]], shares, atol=0.2)
+    match.save(tmp_path / "map.csv")
+    said = program("evaluate", tmp_path / "map.csv", "--source", demo[0], "--target", demo[1], "--ground-truth", "identity", "--json")
+    np.testing.assert_allclose(found.mean_on_surface, json.loads(said)["maps"][0]["on_surface"]["mean"], rtol=1e-3)
+    assert fmnet.evaluate(match.targets, truth, demo[1]).mean_on_surface is None
 
 
 def test_values_follow_the_map(mesh):
