@@ -31,7 +31,7 @@ impl Judge<'_> {
     pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
         let [source, target] = self.sides();
         let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
-        Ok((quality, self.pair.matcher.calibration().estimate(&quality)))
+        Ok((quality, self.pair.matcher.calibration(self.pair.is_part()).estimate(&quality)))
     }
 
     pub(super) fn doubt(&self, found: &Found) -> Vec<f32> {
@@ -62,7 +62,7 @@ impl Pair<'_> {
             ));
         } else if estimate.doubtful {
             let remedy = match self.is_part() {
-                true => "--landmarks or a larger part",
+                true => "a larger part, one in the whole's unit and of a body of its size, or --landmarks",
                 false => "--effort high, --landmarks or --adapt",
             };
             self.warn(&format!(

@@ -175,9 +175,9 @@ impl Matcher {
         self.refinement.unwrap_or_else(|| Refinement::suiting(self.solver(is_part)))
     }
 
-    /// What turns the measures of a map into an estimate of its error.
-    pub fn calibration(&self) -> &Calibration {
-        &self.calibration
+    /// What turns the measures of a map of whole shapes, or of a part and its whole, into an estimate of its error.
+    pub fn calibration(&self, is_part: bool) -> Calibration {
+        if is_part { Calibration::of_parts() } else { self.calibration }
     }
 
     /// The model, unless descriptors are SHOT.

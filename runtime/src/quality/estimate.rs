@@ -40,6 +40,17 @@ impl Default for Calibration {
 }
 
 impl Calibration {
+    /// That of maps of parts to their wholes, whose measures are worse for being parts: fitted on 560 maps, 390 of them bad, by four models,
+    /// of synthetic people, bipeds and quadrupeds cut in pieces onto others of their kind, of the same size and of another. The odds follow
+    /// the expected error: weights of their own for each measure told these parts apart a little better, but not those of a real dog.
+    pub fn of_parts() -> Self {
+        Self {
+            error: [4.594, 0.605, 0.095, 0.080, 0.108, 0.415],
+            bad: [7.801, 2.426, 0.379, 0.321, 0.431, 1.665],
+            doubtful: 0.3,
+        }
+    }
+
     /// A constant and a weight for each measure.
     pub const WIDTH: usize = 6;
 
