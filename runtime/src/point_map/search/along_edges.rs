@@ -30,7 +30,7 @@ impl AlongEdges {
 
     /// Whether the samples are a part of the vertices of both meshes, so that it pays to begin with them.
     pub(crate) fn pays(&self) -> bool {
-        self.shapes.iter().all(|shape| shape.follows.len() > 2 * shape.samples.len())
+        self.shapes.iter().all(|shape| 2 * shape.follows.len() > 3 * shape.samples.len())
     }
 
     /// The samples of source and target.
