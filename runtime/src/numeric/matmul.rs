@@ -28,7 +28,7 @@ impl<'a, T> MatrixView<'a, T> {
     }
 
     /// Number of rows.
-    pub fn n_rows(&self) -> usize {
+    pub(crate) fn n_rows(&self) -> usize {
         self.rows
     }
 
@@ -49,7 +49,7 @@ impl<'a, T> MatrixView<'a, T> {
     /// # Panics
     /// If there are no such rows.
     #[must_use]
-    pub fn rows(self, start: usize, end: usize) -> Self {
+    pub(crate) fn rows(self, start: usize, end: usize) -> Self {
         assert!(start <= end && end <= self.rows, "rows {start}..{end} of {}", self.rows);
         let first = (start * self.row_stride).min(self.data.len());
         Self { data: &self.data[first..], rows: end - start, ..self }
@@ -60,7 +60,7 @@ impl<'a, T> MatrixView<'a, T> {
     /// # Panics
     /// If there are no such columns.
     #[must_use]
-    pub fn cols(self, start: usize, end: usize) -> Self {
+    pub(crate) fn cols(self, start: usize, end: usize) -> Self {
         self.t().rows(start, end).t()
     }
 }

@@ -28,13 +28,20 @@ pub struct Embedding<T = f64> {
     factors: Option<[Matrix<T>; 2]>,
 }
 
-impl Embedding<f32> {
-    /// Of rows `[n_source, d]` and `[n_target, d]`.
-    pub(crate) fn of_single_rows(source: Matrix<f32>, target: Matrix<f32>) -> Self {
-        assert_eq!(source.cols(), target.cols(), "rows in one space");
-        Self { source, target, factors: None }
+impl<T: Copy> Embedding<T> {
+    /// Rows of any kind, `[n_source, d]` and `[n_target, d]`, such as descriptors.
+    ///
+    /// # Errors
+    /// If their widths differ.
+    pub fn of_rows(source: Matrix<T>, target: Matrix<T>) -> Result<Self, SearchError> {
+        if source.cols() != target.cols() {
+            return Err(SearchError::WidthMismatch { queries: source.cols(), targets: target.cols() });
+        }
+        Ok(Self { source, target, factors: None })
     }
+}
 
+impl Embedding<f32> {
     /// The point maps of matches, source to target first, with the cosines between their rows.
     pub(crate) fn point_maps(&self, [forth, back]: [Vec<u32>; 2]) -> [PointMap; 2] {
         let squares = |rows: &Matrix<f32>| -> Vec<f32> {
@@ -114,17 +121,6 @@ impl Embedding<f64> {
             Comparison::Distance => (transport(phi, c), psi.clone()),
             Comparison::Adjoint => (phi.clone(), transport(psi, &c.transposed())),
         };
-        Ok(Self { source, target, factors: None })
-    }
-
-    /// Rows of any kind, `[n_source, d]` and `[n_target, d]`, such as descriptors.
-    ///
-    /// # Errors
-    /// If their widths differ.
-    pub fn of_rows(source: Matrix, target: Matrix) -> Result<Self, SearchError> {
-        if source.cols() != target.cols() {
-            return Err(SearchError::WidthMismatch { queries: source.cols(), targets: target.cols() });
-        }
         Ok(Self { source, target, factors: None })
     }
 

@@ -46,8 +46,7 @@ pub struct WaveletHints<'a> {
     /// landmarks.
     pub anchors: Option<&'a [Matrix; 2]>,
     /// The meshes that the bases are of, source and target. With them, if they have many vertices, rounds match samples only, five for each
-    /// eigenfunction and 1000 or more, and the last round all vertices, along the edges; that takes a tenth of the time. Without them, rounds
-    /// search through all vertices.
+    /// eigenfunction and 1000 or more, and the last round all vertices, along the edges. Without them, rounds search through all vertices.
     pub meshes: Option<[&'a Mesh; 2]>,
 }
 

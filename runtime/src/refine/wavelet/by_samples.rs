@@ -96,7 +96,7 @@ impl<'a> Level<'a> {
         );
         let of_samples = of_samples.each_ref().map(|images| &images[..]);
         let matches = self.edges.nearest([&queries, &targets], of_samples)?;
-        Ok((functional_maps, Embedding::of_single_rows(rows_source, rows_target), matches))
+        Ok((functional_maps, Embedding::of_rows(rows_source, rows_target)?, matches))
     }
 }
 
