@@ -43,7 +43,9 @@ impl From<Failure> for PyErr {
 
 fn of_library(error: &fmnet::Error) -> PyErr {
     match innermost(error) {
-        fmnet::Error::Io(io) => of_io(io).unwrap_or_else(|| Error::new_err(with_arguments(&error.to_string()))),
+        fmnet::Error::Io(io) => {
+            of_io(io).unwrap_or_else(|| Error::new_err(with_arguments(&error.to_string())))
+        }
         fmnet::Error::Network(NetworkError::Read { path, .. }) => match std::fs::metadata(path) {
             Err(source) => system_error(path, &source),
             Ok(_) => PyOSError::new_err(error.to_string()),
