@@ -2,10 +2,14 @@
 //
 //     fmnet-infer features a.ply --out a --model model.onnx
 //     fmnet-infer features b.ply --out b --model model.onnx
-//     npm install && node match.js a b model.onnx map.txt
+//     npm install --ignore-scripts --prefix examples/javascript
+//     node examples/javascript/match.js a b model.onnx map.txt
 //
-// Line i of map.txt is the vertex of b.ply that matches vertex i of a.ply, the map of `fmnet-infer match --refine none`. Where
-// the mesh was repaired or decimated, `features` also writes vertices.npy, and a line belongs to the vertex that is named there.
+// The scripts of onnxruntime-node would fetch libraries for GPUs, which are not needed.
+//
+// Line i of map.txt is the vertex of b.ply that matches vertex i of a.ply, but for ties the map of `fmnet-infer match
+// --refine none`. Where the mesh was repaired or decimated, `features` also writes vertices.npy, and a line belongs to the
+// vertex that is named there.
 "use strict";
 const fs = require("fs");
 const path = require("path");

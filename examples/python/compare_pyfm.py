@@ -1,7 +1,7 @@
 """Evaluates fmnet on a dataset, beside pyFM where that is installed.
 
-    pip install fmnet pyfmaps
-    python compare_pyfm.py registrations --pairs 8
+    pip install ./python pyfmaps
+    python examples/python/compare_pyfm.py registrations --pairs 8
 
 The folder has meshes of one numbering, such as the FAUST registrations: vertex i of one corresponds with vertex i of the other.
 pyFM (1.3 or newer) is run as its tutorial does: wave kernel signatures with 5 landmarks, its fit, ICP, ZoomOut. The landmarks are taken

@@ -1,7 +1,7 @@
 """Carries the landmarks of one specimen to every mesh of a folder.
 
-    pip install fmnet tqdm
-    python landmarks.py specimen.ply landmarks.txt specimens landmarks.csv
+    pip install ./python tqdm
+    python examples/python/landmarks.py specimen.ply landmarks.txt specimens landmarks.csv
 
 landmarks.txt has a vertex of specimen.ply a line, counted from 0. landmarks.csv gets a line for each mesh and landmark: the mesh,
 the landmark, the vertex, and how far its match can be trusted, from 0 to 1.

@@ -1,11 +1,13 @@
 """Matches two meshes with a model of fmnet, in numpy and onnxruntime.
 
+    pip install -r examples/python/requirements.txt
     fmnet-infer features a.ply --out a --model model.onnx
     fmnet-infer features b.ply --out b --model model.onnx
-    python match.py a b model.onnx map.txt
+    python examples/python/match.py a b model.onnx map.txt
 
-Line i of map.txt is the vertex of b.ply that matches vertex i of a.ply, the map of `fmnet-infer match --refine none`. Where the
-mesh was repaired or decimated, `features` also writes vertices.npy, and a line belongs to the vertex that is named there.
+Line i of map.txt is the vertex of b.ply that matches vertex i of a.ply, but for ties the map of `fmnet-infer match
+--refine none`. Where the mesh was repaired or decimated, `features` also writes vertices.npy, and a line belongs to the
+vertex that is named there.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """Matches two meshes and draws both, each point in the colour of its match.
 
-    pip install fmnet matplotlib tqdm
-    python match_and_plot.py man.obj woman.glb pair.png
+    pip install ./python matplotlib tqdm
+    python examples/python/match_and_plot.py man.obj woman.glb pair.png
 """
 
 import argparse
@@ -31,7 +31,7 @@ def draw(axes, vertices, faces, colors, title):
     drawing = axes.plot_trisurf(x, y, z, triangles=faces, shade=False)
     drawing.set_facecolor(colors[faces].mean(axis=1) * (0.4 + 0.6 * facing)[:, None])
     axes.set_title(title)
-    axes.set_box_aspect(np.ptp([x, y, z], axis=1), zoom=1.6)
+    axes.set_box_aspect(np.ptp([x, y, z], axis=1), zoom=1.0)
     axes.set_axis_off()
     axes.view_init(elev=0, azim=-90)
 
@@ -60,9 +60,10 @@ def main():
     matched = match.targets[source.input_vertices]
     source_colors = np.where((matched >= 0)[:, None], colors[matched], 0.5)
 
-    figure, axes = plt.subplots(1, 2, figsize=(8, 6), subplot_kw={"projection": "3d"})
+    figure, axes = plt.subplots(1, 2, figsize=(8, 4.5), subplot_kw={"projection": "3d"})
     draw(axes[0], source.vertices, source.faces, source_colors, source.name)
     draw(axes[1], target.vertices, target.faces, colors[target.input_vertices], target.name)
+    figure.subplots_adjust(left=0, right=1, bottom=0, top=0.92, wspace=0)
     figure.savefig(arguments.out, dpi=150)
     print(f"{(match.targets >= 0).sum()} of {match.n_source} vertices matched; {arguments.out} written")
 

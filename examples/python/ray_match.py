@@ -1,7 +1,7 @@
 """Matches the pairs of a list on many processes or machines, by Ray; the files are those of `fmnet-infer batch`.
 
-    pip install fmnet ray
-    python ray_match.py pairs.txt --out maps --workers 8
+    pip install ./python ray
+    python examples/python/ray_match.py pairs.txt --out maps --workers 8
 
 Every worker loads the model once, and every shape is described once, wherever it is needed. A map that is there is kept where both
 meshes, the model and every option are the same as then, else made anew: either program goes on where the other was stopped.

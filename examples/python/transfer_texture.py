@@ -1,7 +1,7 @@
 """Puts the texture of one mesh onto another, with trimesh.
 
-    pip install fmnet trimesh pillow
-    python transfer_texture.py scan.obj textured.glb scan_textured.glb
+    pip install ./python trimesh pillow
+    python examples/python/transfer_texture.py scan.obj textured.glb scan_textured.glb
 
 Where the second mesh has no texture, a checkerboard is laid over it first, so that one sees what became of it.
 """
