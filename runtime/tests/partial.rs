@@ -2,12 +2,13 @@
 
 use fmnet::Mesh;
 use fmnet::eval::{GroundTruth, geodesic_errors};
-use fmnet::events::ignore;
+use fmnet::events::{Event, ignore};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::io::read_mesh;
 use fmnet::pipeline::{DescribedShape, Effort, MatchOptions, Matcher};
 use fmnet::point_map::PointMap;
 use std::path::Path;
+use std::sync::Mutex;
 
 /// What is left of a mesh without its highest fifth along an axis; the vertices there are no longer in any face.
 fn cut(mesh: &Mesh, axis: usize) -> Mesh {
@@ -29,21 +30,28 @@ fn long_axis(mesh: &Mesh) -> usize {
     (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b))).expect("three axes")
 }
 
+/// The mean distance of each match from the vertex of the same number, relative to sqrt(area).
+fn error_of_identity(found: &PointMap, whole: &Mesh) -> f64 {
+    let matched = |i: usize| if found.get(i).is_some() { i as u32 } else { PointMap::UNMATCHED };
+    let kept = PointMap::new((0..found.len()).map(matched).collect(), whole.n_vertices());
+    let truth = GroundTruth::from_map(&kept).unwrap();
+    let solver = GeodesicSolver::new(whole, &GeodesicOptions::default());
+    let errors = geodesic_errors(found, &truth, &solver, whole.area()).unwrap();
+    errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64
+}
+
+fn body() -> Mesh {
+    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply")).unwrap().mesh
+}
+
 #[test]
 fn a_part_described_as_such_finds_its_place() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply");
-    let whole = &read_mesh(&file).unwrap().mesh;
+    let whole = &body();
     let part = cut(whole, long_axis(whole));
     let matcher = Matcher::new(&MatchOptions::default()).unwrap();
     let target = matcher.describe("whole", whole, &ignore).unwrap();
-    let solver = GeodesicSolver::new(whole, &GeodesicOptions::default());
     let mean_error = |part: &DescribedShape| {
-        let found = matcher.match_shapes(part, &target, &ignore).unwrap().map;
-        let matched = |i: usize| if found.get(i).is_some() { i as u32 } else { PointMap::UNMATCHED };
-        let kept = PointMap::new((0..found.len()).map(matched).collect(), whole.n_vertices());
-        let truth = GroundTruth::from_map(&kept).unwrap();
-        let errors = geodesic_errors(&found, &truth, &solver, whole.area()).unwrap();
-        errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64
+        error_of_identity(&matcher.match_shapes(part, &target, &ignore).unwrap().map, whole)
     };
     let as_part = mean_error(&matcher.describe_part("part", &part, whole.area(), &ignore).unwrap());
     let as_whole = mean_error(&matcher.describe("part", &part, &ignore).unwrap());
@@ -52,9 +60,34 @@ fn a_part_described_as_such_finds_its_place() {
 }
 
 #[test]
+fn a_part_of_another_size_finds_its_place_and_that_is_said() {
+    let whole = &body();
+    let part = cut(whole, long_axis(whole));
+    let smaller = part.vertices().iter().map(|p| p.map(|x| 0.6 * x)).collect();
+    let part = Mesh::new(smaller, part.faces().to_vec()).unwrap();
+    let warnings = Mutex::new(Vec::new());
+    let observer = |event: Event| {
+        if let Event::Warning(text) = event {
+            warnings.lock().unwrap().push(text);
+        }
+    };
+    let matcher = Matcher::new(&MatchOptions::default()).unwrap();
+    let pair = matcher.describe_pair(("part", &part), ("whole", whole), true, &observer).unwrap();
+    let found = matcher.match_shapes(&pair[0], &pair[1], &observer).unwrap();
+    let taken = found.candidates.iter().find(|candidate| candidate.taken).unwrap();
+    assert!(
+        taken.name == "part 2.83 times as large" || taken.name == "part 2.00 times as large",
+        "{taken:?}"
+    );
+    let error = error_of_identity(&found.map, whole);
+    assert!(error < 0.05, "{error}");
+    let warnings = warnings.into_inner().unwrap();
+    assert!(warnings.iter().any(|text| text.contains("one unit of length?")), "{warnings:?}");
+}
+
+#[test]
 fn other_ways_are_tried_for_parts_too() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply");
-    let whole = &read_mesh(&file).unwrap().mesh;
+    let whole = &body();
     let part = cut(whole, long_axis(whole));
     let mut options = MatchOptions::default();
     options.effort = Effort::High;
@@ -62,6 +95,8 @@ fn other_ways_are_tried_for_parts_too() {
     let [part, whole] = matcher.describe_pair(("part", &part), ("whole", whole), true, &ignore).unwrap();
     let found = matcher.match_shapes(&part, &whole, &ignore).unwrap();
     let names: Vec<&str> = found.candidates.iter().map(|candidate| candidate.name.as_str()).collect();
-    assert_eq!(names, ["default", "features alone", "k = 50", "strong mask"]);
+    assert_eq!(names[..4], ["default", "features alone", "k = 50", "strong mask"]);
+    // Nine tenths of the whole cannot be larger.
+    assert_eq!(names[4..], ["part 0.71 times as large"]);
     assert_eq!(found.candidates.iter().filter(|candidate| candidate.taken).count(), 1);
 }

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use super::EvalError;
 use crate::Mesh;
 use crate::io::{path_from_bytes, read_point_map, read_surface_points};
-use crate::mesh::{SurfacePoint, vec3};
+use crate::mesh::{SurfacePoint, vec3, vertices_on_surface};
 use crate::point_map::PointMap;
 
 /// Correct matches between a source and a target, as pairs of 0-based vertices.
@@ -33,8 +33,8 @@ pub enum GroundTruthSource {
     /// `FILE`: a map file from source to target, or points on the target's surface, one for each source vertex (`.corr`,
     /// `.baryc_gt`).
     Map(PathBuf),
-    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex). Of two files of points on
-    /// surfaces (`.corr`), each source point counts at its nearest vertex, and of several at one vertex the nearest.
+    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex). Where one has points on a
+    /// surface (`.corr`), each source point counts at its nearest vertex, and of several at one vertex the nearest.
     Lists(PathBuf, PathBuf),
 }
 
@@ -92,9 +92,9 @@ impl GroundTruthSource {
                 super::check_size("the ground truth", points.len(), "the source", source.n_vertices())?;
                 Ok(GroundTruth::of_points(&points, target))
             }
-            Self::Lists(of_source, of_target) if holds_points(of_source) && holds_points(of_target) => {
-                let from = read_surface_points(of_source, source.n_faces())?;
-                let to = read_surface_points(of_target, target.n_faces())?;
+            Self::Lists(of_source, of_target) if holds_points(of_source) || holds_points(of_target) => {
+                let from = read_points(of_source, source)?;
+                let to = read_points(of_target, target)?;
                 check_lists([of_source, of_target], [from.len(), to.len()])?;
                 Ok(GroundTruth::of_points(&at_nearest_vertices(&from, &to, source), target))
             }
@@ -121,6 +121,16 @@ impl GroundTruthSource {
             }
         }
     }
+}
+
+/// The points of a mesh that a file lists, by triangles or by vertices; a vertex of no face is none.
+fn read_points(file: &Path, mesh: &Mesh) -> Result<Vec<Option<SurfacePoint>>, EvalError> {
+    if holds_points(file) {
+        return Ok(read_surface_points(file, mesh.n_faces())?);
+    }
+    let vertices = read_point_map(file, Some(mesh.n_vertices()))?;
+    let on_surface = vertices_on_surface(mesh);
+    Ok(vertices.iter().map(|vertex| on_surface[vertex? as usize]).collect())
 }
 
 fn check_lists([source, target]: [&PathBuf; 2], [n_source, n_target]: [usize; 2]) -> Result<(), EvalError> {
@@ -290,6 +300,11 @@ mod tests {
         assert_eq!(truth.pairs(), expected);
         assert!(truth.points().unwrap().iter().any(|point| point.weights[1] == 0.8));
         assert!(truth.pairs().iter().all(|pair| pair.0 != c));
+        // Vertices of the target instead, counted from 1.
+        let vertices = file("b.vts", &format!("{}\n{}\n{}\n0\n", b + 1, c + 1, a + 1));
+        let mut expected = vec![(a, c), (b, a)];
+        expected.sort_unstable();
+        assert_eq!(lists(&vertices).unwrap().pairs(), expected);
         let short = file("c.corr", "3 1 0 0\n");
         assert!(matches!(lists(&short), Err(EvalError::ListMismatch { n_source: 4, n_target: 1, .. })));
     }

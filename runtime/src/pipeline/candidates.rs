@@ -5,7 +5,7 @@ use super::judge::Judge;
 use super::landmarks::Landmarks;
 use super::pair::{Pair, of_length};
 use super::refine::Found;
-use super::{Effort, Refinement};
+use super::{DescribedShape, Effort, Refinement};
 use crate::Matrix;
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
@@ -60,22 +60,31 @@ pub(super) struct Tried {
     pub(super) quality: Quality,
     pub(super) estimate: Estimate,
     pub(super) candidates: Vec<Candidate>,
+    /// The part in the size that the map was found in, where that is not its own.
+    pub(super) resized: Option<Box<DescribedShape>>,
 }
 
 impl Tried {
     fn first(name: &str, found: Found, (quality, estimate): (Quality, Estimate)) -> Self {
         let candidate = Candidate { name: name.to_string(), quality, estimate, taken: true };
-        Self { found, quality, estimate, candidates: vec![candidate] }
+        Self { found, quality, estimate, candidates: vec![candidate], resized: None }
     }
 
-    /// Takes another map if it is clearly better.
-    fn add(&mut self, name: &str, found: Found, (quality, estimate): (Quality, Estimate)) {
-        let better = estimate.expected_error < CLEARLY * self.estimate.expected_error;
+    /// Takes another map if it is clearly better: if its expected error is below so large a share of the one so far.
+    pub(super) fn add(
+        &mut self,
+        name: &str,
+        found: Found,
+        (quality, estimate): (Quality, Estimate),
+        clearly: f64,
+    ) -> bool {
+        let better = estimate.expected_error < clearly * self.estimate.expected_error;
         if better {
             self.candidates.iter_mut().for_each(|candidate| candidate.taken = false);
             (self.found, self.quality, self.estimate) = (found, quality, estimate);
         }
         self.candidates.push(Candidate { name: name.to_string(), quality, estimate, taken: better });
+        better
     }
 }
 
@@ -100,7 +109,7 @@ impl Pair<'_> {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             let found = self.refine(Refinement::Wavelet, &start)?;
             let judged = judge.judge(&found)?;
-            tried.add("without descriptors beside", found, judged);
+            tried.add("without descriptors beside", found, judged, CLEARLY);
         }
         if all || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;
@@ -120,14 +129,14 @@ impl Pair<'_> {
         let mut attempt = |name: &str, start: &Start| -> Result<(), Error> {
             let found = self.refine(Refinement::Wavelet, start)?;
             let judged = judge.judge(&found)?;
-            tried.add(name, found, judged);
+            tried.add(name, found, judged, CLEARLY);
             Ok(())
         };
         attempt("features alone", &Start { anchors: start.anchors.clone(), ..self.by_rows(own)? })?;
         attempt("k = 50", &self.solved(own, k.min(50), 1.0, landmarks)?)?;
         attempt("strong mask", &self.solved(own, k, 10.0, landmarks)?)?;
         if self.is_part() {
-            return Ok(());
+            return self.try_sizes(tried, landmarks);
         }
         let shot = ShotOptions { radius: SHOT_RADIUS, ..self.matcher.shot };
         let [source, target] =
@@ -158,7 +167,7 @@ impl Pair<'_> {
     }
 
     /// The functional maps of descriptors at another `k` or so many times the usual weight of the mask.
-    fn solved(
+    pub(super) fn solved(
         &self,
         descriptors: [&Matrix<f32>; 2],
         k: usize,

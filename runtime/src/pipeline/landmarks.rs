@@ -83,6 +83,11 @@ pub(super) struct Landmarks {
 }
 
 impl Landmarks {
+    /// The same landmarks of another pair.
+    pub(super) fn of(&self, pair: &Pair) -> Result<Self, Error> {
+        Self::new(pair, &self.pairs)
+    }
+
     /// Finds matches of the inputs' vertices on the working meshes.
     pub(super) fn new(pair: &Pair, pairs: &[(u32, u32)]) -> Result<Self, Error> {
         check_images(pairs)?;

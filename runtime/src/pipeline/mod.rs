@@ -20,6 +20,7 @@ mod judge;
 mod landmarks;
 mod options;
 mod pair;
+mod part_size;
 mod refine;
 
 use crate::cache::{Cache, CacheKey};

@@ -20,6 +20,9 @@ use std::sync::OnceLock;
 /// other makers 7 to 14 give the same, 0 and 20 are worse.
 const DESCRIPTORS_BESIDE: f64 = 10.0;
 
+/// A part of so large a share of the whole is in another unit of length, or no part.
+pub(super) const LARGEST_SHARE: f64 = 1.1;
+
 pub(super) struct Pair<'a> {
     pub(super) matcher: &'a Matcher,
     pub(super) source: &'a DescribedShape,
@@ -53,10 +56,13 @@ impl Pair<'_> {
         let found = self.refine(refinement, &start)?;
         let judge = self.timed("quality", || self.judge())?;
         let tried = self.with_candidates(&judge, &start, found, landmarks)?;
-        let Tried { found, quality, estimate, candidates } = tried;
+        let Tried { found, quality, estimate, candidates, resized } = tried;
         drop(reserved);
         self.say_what_looks_wrong(&quality, &estimate);
-        let doubt = judge.doubt(&found);
+        let doubt = match &resized {
+            Some(source) => self.with_source(source).judge()?.doubt(&found),
+            None => judge.doubt(&found),
+        };
         let (mut map, upscale_info) = self.on_inputs(&found, &doubt)?;
         if let Some(landmarks) = landmarks {
             landmarks.keep(&mut map, &self.target.shape);
@@ -73,6 +79,11 @@ impl Pair<'_> {
         })
     }
 
+    /// The pair with another source.
+    pub(super) fn with_source<'b>(&'b self, source: &'b DescribedShape) -> Pair<'b> {
+        Pair { source, edges: OnceLock::new(), ..*self }
+    }
+
     pub(super) fn is_part(&self) -> bool {
         self.source.shape.whole_area.is_some()
     }
@@ -82,13 +93,18 @@ impl Pair<'_> {
         if self.target.shape.whole_area.is_some() {
             return Err(Error::PartAsTarget);
         }
-        let share = self.source.shape.full_mesh.area() / self.source.shape.unit_area();
-        if share > 1.1 {
+        let share = self.share_of_whole();
+        if share > LARGEST_SHARE {
             self.warn(&format!(
                 "the part has {share:.3} times the area of the whole: both must be in one unit of length, the part first"
             ));
         }
         Ok(())
+    }
+
+    /// The area of the source as a share of that of the whole.
+    pub(super) fn share_of_whole(&self) -> f64 {
+        self.source.shape.full_mesh.area() / self.source.shape.unit_area()
     }
 
     pub(super) fn timed<T>(&self, stage: &'static str, run: impl FnOnce() -> T) -> T {

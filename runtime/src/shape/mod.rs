@@ -250,6 +250,15 @@ impl Shape {
         self.whole_area.unwrap_or_else(|| self.mesh().area())
     }
 
+    /// The shape as a part of a whole of another area, in squared units of the mesh; what does not depend on that stays computed.
+    pub(crate) fn part_of(&self, whole_area: f64) -> Self {
+        let mut part = self.clone();
+        part.whole_area = Some(whole_area);
+        part.key = CacheKey::of(&[self.key.as_bytes(), &whole_area.to_le_bytes()]);
+        part.store().forget_sizes();
+        part
+    }
+
     fn encode(&self) -> Vec<u8> {
         let mut out = Encoder::default();
         encode_mesh(&mut out, &self.full_mesh);

@@ -36,6 +36,14 @@ pub(super) struct Store {
     shot: Vec<(ShotOptions, Arc<Matrix<f32>>)>,
 }
 
+impl Store {
+    /// Forgets what depends on the area that counts as 1.
+    pub(super) fn forget_sizes(&mut self) {
+        self.gradients = None;
+        self.shot.clear();
+    }
+}
+
 impl Shape {
     pub(super) fn store(&self) -> MutexGuard<'_, Store> {
         self.store.lock().unwrap_or_else(PoisonError::into_inner)
