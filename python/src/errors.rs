@@ -114,6 +114,8 @@ const ARGUMENTS: [(&str, bool); 9] = [
 
 /// A text that names options of the program, with the arguments of functions in their place: `--effort high` becomes `effort="high"`.
 fn with_arguments(text: &str) -> String {
+    // Maps are drawn by other packages here.
+    let text = text.replace(" (-o map.html)", "");
     let mut words = text.split(' ');
     let mut said: Vec<String> = Vec::new();
     while let Some(word) = words.next() {

@@ -366,6 +366,11 @@ impl TrainConfig {
         }
     }
 
+    /// Whether training needs points that correspond: the residual network sees nothing else, and most losses compare them.
+    pub(crate) fn needs_points(&self) -> bool {
+        self.diffusion().is_none() || self.loss.spectral > 0.0 || self.loss.needs_points()
+    }
+
     /// What a step minimises and how.
     pub fn step_options(&self) -> StepOptions {
         let functional_map = FmapSolver::new(self.solver, Some(self.mask_weight));

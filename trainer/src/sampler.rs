@@ -2,7 +2,8 @@
 //!
 //! The residual network sees points one by one, so a minibatch is one index set of points of a pair, the same for both shapes.
 //! A network that sees the surface gets whole meshes, and points are drawn from its output. Either way point `i` of the source
-//! corresponds with point `i` of the target; where the source is a part, the target has further points. Minibatch `b` of a run
+//! corresponds with point `i` of the target; where the source is a part, the target has further points. Losses without ground truth
+//! take no points of whole meshes. Minibatch `b` of a run
 //! depends on the seed and on `b` alone, so a resumed run draws what the uninterrupted one would have.
 
 use crate::config::{Sampling, TrainConfig};
@@ -82,7 +83,7 @@ impl<'a> Sampler<'a> {
     ///
     /// # Errors
     /// If no two shapes of a group share enough points (of the pool, where distances between them are needed), the larger
-    /// of 50 and `k`.
+    /// of 50 and `k`; where no loss needs points, if no group has two shapes.
     pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
         let sampler = Self { shapes, pairs: Vec::new(), config };
         let least = MIN_COMMON_POINTS.max(config.k);
@@ -90,7 +91,8 @@ impl<'a> Sampler<'a> {
         for (source, s) in shapes.iter().enumerate() {
             for (target, t) in shapes.iter().enumerate() {
                 let corresponds = source != target && s.entry.group == t.entry.group && !t.entry.is_part();
-                if corresponds && sampler.common_points(s, t).len() >= least {
+                let enough = || !config.needs_points() || sampler.common_points(s, t).len() >= least;
+                if corresponds && enough() {
                     pairs.entry(&s.entry.group).or_default().push((source, target));
                 }
             }
@@ -122,8 +124,11 @@ impl<'a> Sampler<'a> {
         let &(source, target) = group.choose(rng).expect("a group has pairs");
         let (source, target) = (&self.shapes[source], &self.shapes[target]);
         let target_arrays = target.arrays()?;
-        let (common, all) = self.draw(source, target, &target_arrays.mass, rng);
-        if common.len() < MIN_DRAWN_POINTS {
+        let (common, all) = match self.config.needs_points() {
+            true => self.draw(source, target, &target_arrays.mass, rng),
+            false => (Vec::new(), Vec::new()),
+        };
+        if self.config.needs_points() && common.len() < MIN_DRAWN_POINTS {
             let (source_name, target_name) = (source.entry.name.clone(), target.entry.name.clone());
             let (common, drawn) = (common.len(), all.len());
             return Err(SamplerError::TooFewCommon { source_name, target_name, common, drawn });
@@ -350,13 +355,26 @@ mod tests {
     use super::*;
     use crate::dataset::{Correspondence, ShapeEntry, Split};
     use crate::losses::LossOptions;
+    use crate::network::NetworkOptions;
     use crate::precompute::prepare;
+    use crate::step::StepRunner;
     use crate::train::prepare_options;
     use fmnet::Mesh;
     use fmnet::cache::Cache;
     use fmnet::io::{Attributes, write_mesh};
     use fmnet::mesh::shapes::bumpy_sphere;
-    use std::path::Path;
+    use std::path::{Path, PathBuf};
+
+    fn entry(name: &str, mesh: PathBuf) -> ShapeEntry {
+        ShapeEntry {
+            name: name.into(),
+            mesh,
+            group: "sphere".into(),
+            correspondence: Correspondence::Identity,
+            split: Split::Train,
+            whole: None,
+        }
+    }
 
     /// A sphere and, after it, its first 400 faces, which are a part of it.
     fn whole_and_part(folder: &Path, config: &TrainConfig) -> [PreparedShape; 2] {
@@ -366,14 +384,8 @@ mod tests {
         let shape = |(name, mesh, is_part): (&str, &Mesh, bool)| {
             let path = folder.join(format!("{name}.off"));
             write_mesh(&path, mesh, &Attributes::default()).unwrap();
-            let entry = ShapeEntry {
-                name: name.into(),
-                mesh: path,
-                group: "sphere".into(),
-                correspondence: Correspondence::Identity,
-                split: Split::Train,
-                whole: is_part.then(|| folder.join("whole.off")),
-            };
+            let whole = is_part.then(|| folder.join("whole.off"));
+            let entry = ShapeEntry { whole, ..entry(name, path) };
             prepare(&entry, &prepare_options(config), 1, &cache, &fmnet::events::ignore).unwrap()
         };
         [("whole", &whole, false), ("part", &part, true)].map(shape)
@@ -401,6 +413,33 @@ mod tests {
         let norm = |matrix: &Matrix| matrix.data().iter().map(|x| x * x).sum::<f64>().sqrt();
         let difference = Matrix::from_fn(10, 10, |i, j| back[(i, j)] - restriction[(i, j)]);
         assert!(norm(&difference) < 0.05 * norm(&restriction), "{difference:?}");
+    }
+
+    #[test]
+    fn without_ground_truth_shapes_need_no_common_points() {
+        let folder = tempfile::tempdir().unwrap();
+        let loss = LossOptions { bijectivity: 1.0, orthogonality: 1.0, coupling: 1.0, ..LossOptions::none() };
+        let network = NetworkOptions::Diffusion(DiffusionOptions {
+            blocks: 1,
+            width: 8,
+            outputs: 8,
+            eigenfunctions: 10,
+            wks_eigenfunctions: 10,
+            ..DiffusionOptions::default()
+        });
+        let config = TrainConfig { k: 10, loss, network, ..TrainConfig::default() };
+        let cache = Cache::open(&folder.path().join("cache")).unwrap();
+        let shapes = [("coarse", bumpy_sphere(2, 1)), ("fine", bumpy_sphere(3, 2))].map(|(name, mesh)| {
+            let path = folder.path().join(format!("{name}.off"));
+            write_mesh(&path, &mesh, &Attributes::default()).unwrap();
+            let entry = entry(name, path);
+            prepare(&entry, &prepare_options(&config), 1, &cache, &fmnet::events::ignore).unwrap()
+        });
+        let batch = Sampler::new(&shapes, &config).unwrap().batch(0).unwrap();
+        assert!(batch[0].source.points.is_empty() && batch[0].target.points.is_empty());
+        let network = config.network.build(1, &candle_core::Device::Cpu).unwrap();
+        let mut runner = StepRunner::new(network, config.step_options()).unwrap();
+        assert!(runner.step(&batch, 1e-3).unwrap().loss > 0.0);
     }
 
     #[test]

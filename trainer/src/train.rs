@@ -70,7 +70,7 @@ pub enum TrainError {
     },
     /// The run's folder belongs to another configuration.
     #[error(
-        "{folder} holds a run with another {setting} ({found} instead of {wanted}); choose another --out, or remove the folder to start anew"
+        "{folder} holds a run whose {setting} is {found}, not {wanted}; choose another --out, or remove the folder to start anew"
     )]
     OtherRun {
         /// The run's folder.
@@ -216,7 +216,9 @@ fn prepare_entries(
         })
         .collect();
     let prepared = prepared?;
-    check_groups(prepared.iter().map(|shape| (&shape.entry, shape.points.len())))?;
+    if config.needs_points() {
+        check_groups(prepared.iter().map(|shape| (&shape.entry, shape.points.len())))?;
+    }
     Ok(prepared)
 }
 

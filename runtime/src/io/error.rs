@@ -110,6 +110,12 @@ impl ParseError {
         Self::new(Position::Line(line), problem, REEXPORT)
     }
 
+    /// A file that is whole, but not what is needed here.
+    pub(super) fn with_remedy(mut self, remedy: &'static str) -> Self {
+        self.remedy = remedy.into();
+        self
+    }
+
     pub(super) fn byte(byte: usize, problem: impl Into<String>) -> Self {
         Self::new(Position::Byte(byte), problem, REEXPORT)
     }

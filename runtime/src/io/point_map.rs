@@ -167,7 +167,8 @@ pub(super) fn decode(bytes: &[u8], format: PointMapFormat, n_target: Option<usiz
         PointMapFormat::Npy => decode_npy(bytes, n_target),
         PointMapFormat::Csv => decode_csv(bytes, n_target),
         PointMapFormat::Npz => {
-            Err(ParseError::part("file", ".npz maps are not read; pass the .csv, or the targets as .npy"))
+            let error = ParseError::part("file", ".npz maps are not read");
+            Err(error.with_remedy("write the map as .csv, or its targets as .npy"))
         }
     }
 }
@@ -275,7 +276,8 @@ impl Table {
         }
         match (size("n_target="), self.n_target) {
             (Some(stated), Some(known)) if stated != known => {
-                Err(words.error(format!("the map is to {stated} vertices, but the target has {known}")))
+                let problem = format!("the map is to {stated} vertices, but the target has {known}");
+                Err(words.error(problem).with_remedy("pass the map of these two meshes, in this order"))
             }
             (Some(stated), _) => {
                 self.n_target = Some(stated);

@@ -103,16 +103,17 @@ impl Pair<'_> {
         if self.matcher.refinement(self.is_part()) != Refinement::Wavelet {
             return Ok(tried);
         }
-        let all = self.matcher.effort == Effort::High || self.matcher.adapt.is_some_and(|steps| steps > 0);
+        let all = self.matcher.effort == Effort::High;
         let more = self.matcher.effort != Effort::Low;
         if self.descriptors_tell_vertices() && (all || more && tried.estimate.bad > WORTH_A_TRY) {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
-            let found = self.refine(Refinement::Wavelet, &start)?;
-            let judged = judge.judge(&found)?;
-            tried.add("without descriptors beside", found, judged, CLEARLY);
+            self.attempt("without descriptors beside", &start, judge, &mut tried)?;
         }
+        let asked_to_adapt = self.matcher.adapt.is_some_and(|steps| steps > 0);
         if all || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;
+        } else if asked_to_adapt && !self.is_part() {
+            self.try_adapted(judge, &mut tried, landmarks)?;
         }
         Ok(tried)
     }
@@ -126,12 +127,7 @@ impl Pair<'_> {
     ) -> Result<(), Error> {
         let k = self.matcher.k;
         let own = [&self.source.descriptors, &self.target.descriptors];
-        let mut attempt = |name: &str, start: &Start| -> Result<(), Error> {
-            let found = self.refine(Refinement::Wavelet, start)?;
-            let judged = judge.judge(&found)?;
-            tried.add(name, found, judged, CLEARLY);
-            Ok(())
-        };
+        let mut attempt = |name: &str, start: &Start| self.attempt(name, start, judge, tried);
         attempt("features alone", &Start { anchors: start.anchors.clone(), ..self.by_rows(own)? })?;
         attempt("k = 50", &self.solved(own, k.min(50), 1.0, landmarks)?)?;
         attempt("strong mask", &self.solved(own, k, 10.0, landmarks)?)?;
@@ -143,10 +139,26 @@ impl Pair<'_> {
             [self.source, self.target].map(|described| described.shape.shot(&shot, self.context));
         let anchors = self.anchors(None, landmarks);
         attempt("SHOT alone", &Start { anchors, ..self.by_rows([&*source?, &*target?])? })?;
-        if let Some((network, steps)) = self.adaptation() {
-            let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
-            attempt("adapted", &self.solved([&source, &target], k, 1.0, landmarks)?)?;
-        }
+        self.try_adapted(judge, tried, landmarks)
+    }
+
+    /// The map of the network adapted to the pair, where it can be.
+    fn try_adapted(
+        &self,
+        judge: &Judge,
+        tried: &mut Tried,
+        landmarks: Option<&Landmarks>,
+    ) -> Result<(), Error> {
+        let Some((network, steps)) = self.adaptation() else { return Ok(()) };
+        let [source, target] = self.timed("adaptation", || adapted(self, network, steps))?;
+        let start = self.solved([&source, &target], self.matcher.k, 1.0, landmarks)?;
+        self.attempt("adapted", &start, judge, tried)
+    }
+
+    fn attempt(&self, name: &str, start: &Start, judge: &Judge, tried: &mut Tried) -> Result<(), Error> {
+        let found = self.refine(Refinement::Wavelet, start)?;
+        let judged = judge.judge(&found)?;
+        tried.add(name, found, judged, CLEARLY);
         Ok(())
     }
 

@@ -162,7 +162,9 @@ pub enum EvaluateError {
         pair: String,
     },
     /// There is nothing to evaluate.
-    #[error("there are no pairs to evaluate: the split needs two shapes of one group at least")]
+    #[error(
+        "there are no pairs to evaluate: the chosen splits need two shapes of one group at least; choose others (--splits)"
+    )]
     NoPairs,
 }
 
@@ -171,11 +173,9 @@ impl MethodResult {
     pub fn mean(&self) -> MeanSummary {
         let n = self.pairs.len().max(1) as f64;
         let mean = |value: fn(&PairResult) -> f64| self.pairs.iter().map(value).sum::<f64>() / n;
-        let mut means: Vec<f64> = self.pairs.iter().map(|p| p.summary.mean).collect();
-        means.sort_by(f64::total_cmp);
         MeanSummary {
             mean: mean(|p| p.summary.mean),
-            median: means.get(means.len() / 2).copied().unwrap_or_default(),
+            median: median(self.pairs.iter().map(|p| p.summary.mean).collect()),
             exact: mean(|p| p.summary.exact),
             within_005: mean(|p| p.summary.within_005),
             auc: mean(|p| p.summary.auc),
@@ -185,6 +185,17 @@ impl MethodResult {
             worst_length: mean(|p| p.summary.worst_length),
             seconds: mean(|p| p.seconds),
         }
+    }
+}
+
+/// The middle value, or the mean of both middle ones; 0 of none.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match (values.len() % 2, values.get(middle)) {
+        (_, None) => 0.0,
+        (1, Some(&value)) => value,
+        (_, Some(&upper)) => (values[middle - 1] + upper) / 2.0,
     }
 }
 

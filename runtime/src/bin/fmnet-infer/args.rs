@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// A map gives every vertex of the source a vertex of the target. Meshes may be OFF, PLY, OBJ, glTF, GLB or STL, in any unit,
 /// with holes, several components and other defects; results are always in the vertices of the files as they are.
 ///
-/// Exit status: 0 success, 2 bad usage or bad input, 1 a failure of the program.
+/// Exit status: 0 success, 2 bad usage or bad input, 1 a failure of the program; with `match --strict` 3 for a doubtful map.
 #[derive(Debug, Parser)]
 #[command(name = "fmnet-infer", version, max_term_width = 110)]
 pub(crate) struct Cli {
@@ -126,7 +126,8 @@ pub(crate) struct MatchArgs {
     /// Mesh that they are matched to
     pub(crate) target: PathBuf,
     /// Output; may be given several times. The extension decides: .txt (one 0-based target vertex a line, -1 where
-    /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence), .ply or .glb (both meshes side by
+    /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence and the point on the target's surface), .npz
+    /// (the same as arrays), .ply or .glb (both meshes side by
     /// side, coloured alike where they match), .png (a picture of that), .html (viewer)
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
@@ -151,7 +152,7 @@ pub(crate) struct MatchArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  fmnet-infer batch pairs.txt --root scans --out maps")]
 pub(crate) struct BatchArgs {
-    /// Text file with a pair of mesh files a line, separated by white space, a comma or a tab; names with spaces may stand in
+    /// Text file with a pair of mesh files a line, separated by white space, a comma, a semicolon or a tab; names with spaces may stand in
     /// quotes; # begins a comment. `-` is standard input
     pub(crate) pairs: PathBuf,
     /// Folder for the maps, SOURCE__TARGET.EXT, each with a .key file that says what it was made from. A map that is there is
@@ -210,8 +211,8 @@ pub(crate) enum Receiver {
 pub(crate) struct FeaturesArgs {
     /// The mesh
     pub(crate) mesh: PathBuf,
-    /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], shot.npy [n,352] and, with learned
-    /// descriptors, descriptors.npy [n,352]; where the mesh was repaired or decimated so that vertices differ from the
+    /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], what else the model takes (shot.npy [n,352],
+    /// gradients_x.npy and gradients_y.npy [n,k]) and its descriptors.npy [n,d]; without a model shot.npy alone. Where the mesh was repaired or decimated so that vertices differ from the
     /// file's, also vertices.npy [n]: the file's vertex of each row. Files of an earlier run are replaced or removed
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
