@@ -8,6 +8,7 @@
 use crate::events::{Event, Observer};
 use crate::io::{IoError, write_atomically};
 use bytemuck::Pod;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 8] = b"FMNETC\0\0";
@@ -58,12 +59,24 @@ impl CacheKey {
 /// What a look-up found.
 #[derive(Debug)]
 pub enum Lookup {
-    /// The entry's payload.
-    Hit(Vec<u8>),
+    /// The entry.
+    Hit(Payload),
     /// No such entry.
     Miss,
     /// An entry that is truncated, corrupt, of another version or unreadable, and why.
     Damaged(String),
+}
+
+/// What an entry holds, in the bytes of its file.
+#[derive(Clone, Debug)]
+pub struct Payload(Vec<u8>);
+
+impl Deref for Payload {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.0[HEADER_LEN..]
+    }
 }
 
 /// A folder of entries.
@@ -101,7 +114,7 @@ impl Cache {
     }
 
     /// Reads an entry; a damaged one is reported and counts as absent, so that it is computed and written again.
-    pub fn fetch(&self, kind: &str, key: CacheKey, observer: Observer) -> Option<Vec<u8>> {
+    pub fn fetch(&self, kind: &str, key: CacheKey, observer: Observer) -> Option<Payload> {
         match self.get(kind, key) {
             Lookup::Hit(bytes) => Some(bytes),
             Lookup::Miss => None,
@@ -132,7 +145,7 @@ fn checksum(key: CacheKey, payload: &[u8]) -> [u8; 32] {
     *blake3::keyed_hash(&key.0, payload).as_bytes()
 }
 
-fn checked_payload(mut bytes: Vec<u8>, key: CacheKey) -> Result<Vec<u8>, String> {
+fn checked_payload(bytes: Vec<u8>, key: CacheKey) -> Result<Payload, String> {
     if bytes.len() < HEADER_LEN || &bytes[..8] != MAGIC {
         return Err("not a cache entry".into());
     }
@@ -148,8 +161,7 @@ fn checked_payload(mut bytes: Vec<u8>, key: CacheKey) -> Result<Vec<u8>, String>
     if bytes[20..HEADER_LEN] != checksum(key, &bytes[HEADER_LEN..]) {
         return Err("checksum does not match".into());
     }
-    bytes.drain(..HEADER_LEN);
-    Ok(bytes)
+    Ok(Payload(bytes))
 }
 
 /// Writes plain values and arrays one after another, in the byte order of the machine.

@@ -41,20 +41,24 @@ pub(super) fn write_surface_parts(
         for (&kind, name) in options.kinds.iter().zip(part_names(whole, options)) {
             let unit = Some(entries[0].mesh.clone());
             let part = ShapeEntry { whole: unit, ..surface_entry(whole, out, name) };
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(count, wholes.len() * options.kinds.len(), &part.name);
             if !part.mesh.is_file() {
                 let made =
                     cut_part(&mesh, kind, options, number as u64).map_err(|e| e.in_shape(&whole.name))?;
+                if made.mesh.n_vertices() < options.min_vertices {
+                    continue;
+                }
                 save_with_points(&part, &made.mesh, &points_of_part(&made, &mesh, &points))?;
             }
-            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(count, wholes.len() * options.kinds.len(), &part.name);
             entries.push(part);
         }
         Ok::<Vec<ShapeEntry>, SimulateError>(entries)
     };
     let entries: Vec<Vec<ShapeEntry>> = wholes.par_iter().enumerate().map(make).collect::<Result<_, _>>()?;
-    manifest::write(out, &entries.concat())?;
-    Ok(wholes.len() * options.kinds.len())
+    let entries = entries.concat();
+    manifest::write(out, &entries)?;
+    Ok(entries.len() - wholes.len())
 }
 
 /// The names of a shape's parts, by kind.

@@ -262,6 +262,10 @@ fn parts_of_other_triangulations_keep_the_points_that_they_have() {
 
     // Parts are not cut again.
     let again = tempfile::tempdir().unwrap();
+    let large = tempfile::tempdir().unwrap();
+    let options = PartOptions { min_vertices: usize::MAX, ..PartOptions::default() };
+    assert_eq!(write_parts(&dataset, large.path(), &options, &quiet).unwrap(), 0);
+    assert!(Dataset::open(large.path()).unwrap().shapes.iter().all(|shape| !shape.is_part()));
     assert_eq!(write_parts(&written, again.path(), &PartOptions::default(), &quiet).unwrap(), 4);
 }
 
