@@ -364,3 +364,15 @@ fn read_map(folder: &Path, source: &str, target: &str, n_target: usize) -> Resul
         None => Err(EvaluateError::NoMap { folder: folder.to_path_buf(), pair }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::median;
+
+    #[test]
+    fn the_median_of_an_even_number_is_between_the_middle_ones() {
+        assert_eq!(median(vec![20.0, 1.0]), 10.5);
+        assert_eq!(median(vec![3.0, 20.0, 1.0]), 3.0);
+        assert_eq!(median(Vec::new()), 0.0);
+    }
+}

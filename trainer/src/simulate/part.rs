@@ -89,6 +89,8 @@ impl PartOptions {
         check("min-holes", self.min_holes >= 1, self.min_holes, "1 or more")?;
         let most = (self.min_holes..=100).contains(&self.max_holes);
         check("max-holes", most, self.max_holes, "min-holes at least, and 100 at most")?;
+        let few = self.min_vertices <= 1_000_000_000;
+        check("min-vertices", few, self.min_vertices, "at most 1000000000")?;
         check("test-parts", (1..=10_000).contains(&self.test_parts), self.test_parts, "from 1 to 10000")
     }
 }
