@@ -86,6 +86,14 @@ impl Tried {
         self.candidates.push(Candidate { name: name.to_string(), quality, estimate, taken: better });
         better
     }
+
+    /// Calls the map taken doubtful from half the usual probability on, where it is not the first: the best of several looks better than it
+    /// is.
+    fn doubt_the_best(&mut self, usual: f64) {
+        let Some(best) = self.candidates.iter_mut().skip(1).find(|candidate| candidate.taken) else { return };
+        self.estimate.doubtful = self.estimate.bad >= usual / 2.0;
+        best.estimate = self.estimate;
+    }
 }
 
 impl Pair<'_> {
@@ -132,7 +140,9 @@ impl Pair<'_> {
         attempt("k = 50", &self.solved(own, k.min(50), 1.0, landmarks)?)?;
         attempt("strong mask", &self.solved(own, k, 10.0, landmarks)?)?;
         if self.is_part() {
-            return self.try_sizes(tried, landmarks);
+            self.try_sizes(tried, landmarks)?;
+            tried.doubt_the_best(self.matcher.calibration(true).doubtful);
+            return Ok(());
         }
         let shot = ShotOptions { radius: SHOT_RADIUS, ..self.matcher.shot };
         let [source, target] =
