@@ -8,7 +8,6 @@
 use crate::events::{Event, Observer};
 use crate::io::{IoError, write_atomically};
 use bytemuck::Pod;
-use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8; 8] = b"FMNETC\0\0";
@@ -59,24 +58,12 @@ impl CacheKey {
 /// What a look-up found.
 #[derive(Debug)]
 pub enum Lookup {
-    /// The entry.
-    Hit(Payload),
+    /// The entry's payload.
+    Hit(Vec<u8>),
     /// No such entry.
     Miss,
     /// An entry that is truncated, corrupt, of another version or unreadable, and why.
     Damaged(String),
-}
-
-/// What an entry holds, in the bytes of its file.
-#[derive(Clone, Debug)]
-pub struct Payload(Vec<u8>);
-
-impl Deref for Payload {
-    type Target = [u8];
-
-    fn deref(&self) -> &[u8] {
-        &self.0[HEADER_LEN..]
-    }
 }
 
 /// A folder of entries.
@@ -114,7 +101,7 @@ impl Cache {
     }
 
     /// Reads an entry; a damaged one is reported and counts as absent, so that it is computed and written again.
-    pub fn fetch(&self, kind: &str, key: CacheKey, observer: Observer) -> Option<Payload> {
+    pub fn fetch(&self, kind: &str, key: CacheKey, observer: Observer) -> Option<Vec<u8>> {
         match self.get(kind, key) {
             Lookup::Hit(bytes) => Some(bytes),
             Lookup::Miss => None,
@@ -145,7 +132,7 @@ fn checksum(key: CacheKey, payload: &[u8]) -> [u8; 32] {
     *blake3::keyed_hash(&key.0, payload).as_bytes()
 }
 
-fn checked_payload(bytes: Vec<u8>, key: CacheKey) -> Result<Payload, String> {
+fn checked_payload(mut bytes: Vec<u8>, key: CacheKey) -> Result<Vec<u8>, String> {
     if bytes.len() < HEADER_LEN || &bytes[..8] != MAGIC {
         return Err("not a cache entry".into());
     }
@@ -161,7 +148,8 @@ fn checked_payload(bytes: Vec<u8>, key: CacheKey) -> Result<Payload, String> {
     if bytes[20..HEADER_LEN] != checksum(key, &bytes[HEADER_LEN..]) {
         return Err("checksum does not match".into());
     }
-    Ok(Payload(bytes))
+    bytes.drain(..HEADER_LEN);
+    Ok(bytes)
 }
 
 /// Writes plain values and arrays one after another, in the byte order of the machine.

@@ -490,7 +490,7 @@ fn cache_entries(folder: &Path) -> Target {
     let key = describe(&cache).unwrap();
     let Lookup::Hit(payload) = cache.get("mesh", key) else { panic!("the shape was not kept") };
     let mesh = mesh.clone();
-    let target = Target::new(vec![payload.to_vec()], move |bytes| {
+    let target = Target::new(vec![payload], move |bytes| {
         cache.put("mesh", key, bytes).unwrap();
         let context = Context { cache: Some(&cache), observer: &ignore };
         let shape = Shape::new("fuzz", &mesh, &ShapeOptions::default(), context);
