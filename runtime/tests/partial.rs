@@ -34,14 +34,16 @@ fn long_axis(mesh: &Mesh) -> usize {
 fn error_of_identity(found: &PointMap, whole: &Mesh) -> f64 {
     let matched = |i: usize| if found.get(i).is_some() { i as u32 } else { PointMap::UNMATCHED };
     let kept = PointMap::new((0..found.len()).map(matched).collect(), whole.n_vertices());
-    let truth = GroundTruth::from_map(&kept).unwrap();
+    let truth = GroundTruth::from_map(&kept).expect("every vertex exists");
     let solver = GeodesicSolver::new(whole, &GeodesicOptions::default());
-    let errors = geodesic_errors(found, &truth, &solver, whole.area()).unwrap();
+    let errors = geodesic_errors(found, &truth, &solver, whole.area()).expect("the map is of this mesh");
     errors.iter().map(|&e| f64::from(e)).sum::<f64>() / errors.len() as f64
 }
 
 fn body() -> Mesh {
-    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply")).unwrap().mesh
+    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("demo/source.ply"))
+        .expect("a mesh of the demo")
+        .mesh
 }
 
 #[test]
