@@ -16,13 +16,8 @@ pub(crate) fn run(args: &MatchArgs, console: &Console) -> Result<()> {
     let start = Instant::now();
     let observer = |event| console.event(event);
     let landmarks = args.landmarks.as_deref().map(read_landmarks).transpose()?.unwrap_or_default();
-    let (matcher, (source, target)) = rayon::join(
-        || Matcher::new(&args.pipeline.to_options()),
-        || rayon::join(|| read_mesh(&args.source), || read_mesh(&args.target)),
-    );
-    let matcher = matcher?;
-    let (source, target) =
-        (with_warnings(&args.source, source?, console), with_warnings(&args.target, target?, console));
+    let matcher = Matcher::new(&args.pipeline.to_options())?;
+    let (source, target) = (read(&args.source, console)?, read(&args.target, console)?);
     let mut inputs = Inputs::of_model(&args.pipeline.shape);
     args.landmarks.iter().for_each(|path| inputs.add(path, "the landmarks"));
     inputs.add_mesh(&args.source, &source);
@@ -81,14 +76,11 @@ fn outputs(args: &MatchArgs) -> Result<Vec<PathBuf>> {
 
 /// Reads a mesh and passes on what its reader has to say about the geometry.
 pub(super) fn read(path: &Path, console: &Console) -> Result<MeshFile> {
-    Ok(with_warnings(path, read_mesh(path)?, console))
-}
-
-fn with_warnings(path: &Path, file: MeshFile, console: &Console) -> MeshFile {
+    let file = read_mesh(path)?;
     for warning in &file.info.warnings {
         console.warn(&format!("{}: {warning}", path.display()));
     }
-    file
+    Ok(file)
 }
 
 fn summary_text(result: &Match, seconds: f64) -> String {
