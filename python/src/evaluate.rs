@@ -82,7 +82,7 @@ impl Evaluation {
         self.summary.count
     }
 
-    /// float : Mean error. The field reports it times 100.
+    /// float : Mean error, relative to sqrt(area); papers give it times 100.
     #[getter]
     fn mean(&self) -> f64 {
         self.summary.mean

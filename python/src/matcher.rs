@@ -254,7 +254,7 @@ impl Matcher {
 ///
 /// Parameters
 /// ----------
-/// source, target : path-like, (vertices, faces), or an object with ``.vertices`` and ``.faces``
+/// source, target : Shape, path-like, (vertices, faces), or an object with ``.vertices`` and ``.faces``
 ///     Vertices [n, 3] of float32 or float64, faces [m, 3] of integers.
 /// partial : bool
 ///     The source is a part of the target, in whatever pose and the same unit of length.
@@ -262,7 +262,7 @@ impl Matcher {
 ///     Matches that are known, a source vertex and a target vertex each: kept exactly, they pull the rest of the map.
 /// progress : callable, optional
 ///     Called as ``progress(subject, stage, seconds)`` where a stage begins (``seconds`` is None) and ends.
-/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, adapt, decimate, subdivide, shot_radius, cache
+/// model, descriptor, k, fm, mask_weight, refine, upscale, effort, adapt, decimate, subdivide, shot_radius, cache, backend
 ///     As of :class:`Matcher`.
 ///
 /// Returns
