@@ -16,8 +16,8 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 /// Steps to larger and to smaller sizes.
 const STEPS: i32 = 3;
 
-/// A map at another size is taken if its expected error is below this share of the one so far: wrong sizes look up to a third better than
-/// the right one, and right ones twice as good as wrong ones.
+/// A map at another size is taken if its expected error is below this share of the one so far. Between unlike bodies four right sizes
+/// came to 0.19 to 0.74 of that at the part's own.
 const CLEARLY: f64 = 0.75;
 
 impl Pair<'_> {

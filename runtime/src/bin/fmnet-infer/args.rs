@@ -132,7 +132,8 @@ pub(crate) struct MatchArgs {
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
     /// The source is a part of a shape, with holes or cut off, and the target the whole, in whatever pose; both in the same
-    /// unit of length. Parts determine fewer eigenfunctions than wholes; where the map is doubtful, fewer are tried
+    /// unit of length. Parts determine fewer eigenfunctions than wholes; where the map is doubtful, fewer are tried,
+    /// and other sizes of the part
     #[arg(long)]
     pub(crate) partial: bool,
     /// Matches that are known, kept exactly, which pull the rest of the map: a text file with a source vertex and a target vertex a
