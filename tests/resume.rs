@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;
+use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
-use fmnet_trainer::network::{NetworkOptions, ResidualOptions};
+use fmnet_trainer::export::{ModelOrigin, export, metadata};
+use fmnet_trainer::network::{DiffusionOptions, NetworkOptions, ResidualOptions};
 use fmnet_trainer::synth::{DatasetOptions, Species, write_dataset};
 use fmnet_trainer::train::{LAST, METRICS, TrainError, train};
 use std::path::Path;
@@ -42,17 +44,75 @@ fn losses(config: &TrainConfig, stop_after: u64) -> Vec<(u64, f64)> {
     losses.into_inner().unwrap()
 }
 
-#[test]
-fn a_stopped_run_goes_on_exactly() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("data");
+fn children(data: &Path) {
     let options = DatasetOptions {
         species: Species::from_name("child").into_iter().collect(),
         per_species: 4,
         validation: 0.5,
         ..Default::default()
     };
-    write_dataset(&data, &options, &|_, _| {}).unwrap();
+    write_dataset(data, &options, &|_, _| {}).unwrap();
+}
+
+#[test]
+fn a_model_file_starts_a_run_as_its_checkpoint_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, model) = (folder.path().join("data"), folder.path().join("model.onnx"));
+    children(&data);
+    let network = DiffusionOptions {
+        blocks: 2,
+        width: 16,
+        outputs: 24,
+        eigenfunctions: 18,
+        wks_energies: 12,
+        wks_eigenfunctions: 20,
+        shot_scale: 3.0,
+    };
+    let first = TrainConfig {
+        network: NetworkOptions::Diffusion(network.clone()),
+        steps: 2,
+        validate_every: 0,
+        ..config(&data, &folder.path().join("first"))
+    };
+    losses(&first, u64::MAX);
+    let checkpoint = Checkpoint::read(&first.out.join(LAST)).unwrap();
+    let network_of = checkpoint.network(&Device::Cpu).unwrap();
+    export(network_of.as_ref(), &metadata(&checkpoint, &ModelOrigin::default()), &model).unwrap();
+
+    let started = |initial: &Path, name: &str, network: &DiffusionOptions| TrainConfig {
+        initial: initial.to_path_buf(),
+        out: folder.path().join(name),
+        steps: 1,
+        network: NetworkOptions::Diffusion(network.clone()),
+        ..first.clone()
+    };
+    let of_checkpoint = losses(&started(&first.out.join(LAST), "checkpoint", &network), u64::MAX)[0].1;
+    let of_model = losses(&started(&model, "model", &network), u64::MAX)[0].1;
+    let of_nothing = losses(&started(Path::new(""), "nothing", &network), u64::MAX)[0].1;
+    assert!((of_model - of_checkpoint).abs() < 1e-5 * of_checkpoint, "{of_model}, {of_checkpoint}");
+    assert!((of_nothing - of_checkpoint).abs() > 1e-3 * of_checkpoint, "{of_nothing}, {of_checkpoint}");
+    // The file's weights hold the scale of SHOT, so that a run may have another.
+    let rescaled = DiffusionOptions { shot_scale: 7.0, ..network.clone() };
+    let of_rescaled = losses(&started(&model, "rescaled", &rescaled), u64::MAX)[0].1;
+    assert!((of_rescaled - of_checkpoint).abs() < 1e-5 * of_checkpoint, "{of_rescaled}, {of_checkpoint}");
+
+    let refusal = |config: TrainConfig| {
+        train(&config, &Device::Cpu, &|_| {}, &AtomicBool::new(false)).unwrap_err().to_string()
+    };
+    let wider = DiffusionOptions { width: 17, ..network.clone() };
+    let text = refusal(started(&model, "wider", &wider));
+    assert!(text.contains("model.onnx (--initial) holds the weights of another network"), "{text}");
+    let text = refusal(started(&folder.path().join("none.onnx"), "none", &network));
+    assert!(text.contains("none.onnx") && text.starts_with("--initial"), "{text}");
+    let text = refusal(started(Path::new("embedded"), "embedded", &network));
+    assert!(text.contains("embedded (--initial) holds the weights of another network"), "{text}");
+}
+
+#[test]
+fn a_stopped_run_goes_on_exactly() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    children(&data);
     let whole = losses(&config(&data, &folder.path().join("whole")), u64::MAX);
     assert_eq!(whole.iter().map(|l| l.0).collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6]);
 

@@ -101,7 +101,8 @@ train_config! {
     out ('o'): PathBuf = PathBuf::from("runs/default"),
     /// Folder where preprocessed shapes are kept; empty: OUT/cache
     cache: PathBuf = PathBuf::new(),
-    /// Checkpoint whose weights the training starts from, say a run on other data; empty: random weights
+    /// Weights that the training starts from: a checkpoint, a model file (.onnx) of a DiffusionNet, or embedded, the built-in model;
+    /// empty: random ones
     initial: PathBuf = PathBuf::new(),
     /// Splits to train on: train, validation, test, separated by commas
     splits: List<Split> = List(vec![Split::Train]),

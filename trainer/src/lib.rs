@@ -44,6 +44,7 @@ pub mod evaluate;
 pub mod events;
 pub mod export;
 pub mod fm_layer;
+mod initial;
 pub mod losses;
 pub mod network;
 mod numeric;

@@ -7,7 +7,8 @@ use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
 use crate::dataset::{Dataset, DatasetError, ShapeEntry, Split, check_groups};
 use crate::events::{TrainEvent, TrainObserver};
-use crate::network::{Network, NetworkOptions};
+use crate::initial::initial_network;
+use crate::network::NetworkOptions;
 use crate::plot::History;
 use crate::precompute::{PrepareError, PrepareOptions, PreparedShape, prepare};
 use crate::sampler::{Sampler, SamplerError};
@@ -87,12 +88,24 @@ pub enum TrainError {
         "{path} (--initial) holds the weights of another network: it has {found}, the run {wanted}; set the table network as there"
     )]
     OtherNetwork {
-        /// The checkpoint.
+        /// The checkpoint or model.
         path: String,
         /// The network there.
         found: String,
         /// The network of this run.
         wanted: String,
+    },
+    /// The model to start from cannot be read.
+    #[error("--initial: {source}")]
+    InitialModel {
+        /// Why.
+        source: Box<fmnet::Error>,
+    },
+    /// The model to start from is not made of the weights of a DiffusionNet.
+    #[error("{path} (--initial) is no DiffusionNet that fmnet-train exported; give its checkpoint instead")]
+    NoDiffusionNet {
+        /// The model file.
+        path: PathBuf,
     },
     /// Validation failed.
     #[error("validation: {0:#}")]
@@ -237,22 +250,6 @@ pub fn prepare_options(config: &TrainConfig) -> PrepareOptions {
         pool: config.pool,
         seed: config.seed,
     }
-}
-
-/// The network that a new run begins with: of random weights, or of those of the checkpoint that the settings name.
-fn initial_network(config: &TrainConfig, device: &Device) -> Result<Box<dyn Network>, TrainError> {
-    if config.initial.as_os_str().is_empty() {
-        return Ok(config.network.build(config.seed, device)?);
-    }
-    let checkpoint = Checkpoint::read(&config.initial)?;
-    if checkpoint.config.network != config.network {
-        return Err(TrainError::OtherNetwork {
-            path: config.initial.display().to_string(),
-            found: format!("{:?}", checkpoint.config.network),
-            wanted: format!("{:?}", config.network),
-        });
-    }
-    Ok(checkpoint.network(device)?)
 }
 
 /// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may

@@ -8,7 +8,7 @@ use super::contract::{Contract, Quantity};
 use super::proto::{Model, Tensor};
 use crate::Matrix;
 use crate::diffusion_net::{Architecture, Operators, forward};
-use crate::spectral::wks_of;
+use crate::spectral::{WksOptions, wks_of};
 use prost::Message;
 use std::collections::BTreeMap;
 
@@ -92,6 +92,21 @@ impl NativeNetwork {
     /// Its weights, flat, in the order of [`Architecture::parameters`].
     pub fn parameters(&self) -> &[f32] {
         &self.parameters
+    }
+
+    /// Eigenpairs of its diffusion.
+    pub fn eigenpairs(&self) -> usize {
+        self.k
+    }
+
+    /// The wave kernel signature among its inputs; of 0 energies where it takes none.
+    pub fn wks(&self) -> WksOptions {
+        WksOptions { energies: self.wks_energies, k: self.wks_pairs }
+    }
+
+    /// Whether SHOT is among its inputs.
+    pub fn takes_shot(&self) -> bool {
+        self.inputs.iter().any(|(quantity, _)| *quantity == Quantity::Shot)
     }
 
     /// A shape of `n` vertices as the network takes it, from an array for each input of the model.
