@@ -172,7 +172,7 @@ def arguments():
     parser.add_argument("pairs", help="a pair of mesh files a line")
     parser.add_argument("--out", required=True, type=Path, help="folder for the maps")
     parser.add_argument("--root", help="folder that mesh files are relative to [default: that of the list]")
-    parser.add_argument("--format", default="txt", choices=["txt", "vts", "npy", "csv"])
+    parser.add_argument("--format", default="txt", choices=["txt", "vts", "npy", "csv", "npz"])
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes [default: the cores of this machine]")
     parser.add_argument("--threads", type=int, default=1, help="threads of each [default: 1]")
     parser.add_argument("--partial", action="store_true", help="every source is a part of its target")

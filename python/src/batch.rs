@@ -17,7 +17,7 @@ use std::path::PathBuf;
 ///     Folder of the maps.
 /// root : path-like, optional
 ///     Folder that mesh files are relative to. Default: that of the list.
-/// format : {"txt", "vts", "npy", "csv"}
+/// format : {"txt", "vts", "npy", "csv", "npz"}
 ///     Format of the maps.
 ///
 /// Returns
@@ -32,8 +32,8 @@ pub(crate) fn read_pairs(
     root: Option<PathBuf>,
     format: &str,
 ) -> PyResult<Vec<(PathBuf, PathBuf, PathBuf)>> {
-    if !["txt", "vts", "npy", "csv"].contains(&format) {
-        return Err(wrong(format!("format is {format:?}, expected \"txt\", \"vts\", \"npy\" or \"csv\"")));
+    if !["txt", "vts", "npy", "csv", "npz"].contains(&format) {
+        return Err(wrong(format!("format is {format:?}, expected \"txt\", \"vts\", \"npy\", \"csv\" or \"npz\"")));
     }
     let pairs = read(&pairs, root.as_deref(), &out, format).map_err(|error| match error {
         PairsError::Io(error) => Failure::from(error).into(),

@@ -54,6 +54,14 @@ impl Match {
         named_tuple(py, "Barycentric", (PyArray1::from_vec(py, faces), out_matrix(py, weights)?)).map(Some)
     }
 
+    /// ndarray of int32, [m] : Source vertices, ascending, that repair left out, of small pieces and of faces without area: each
+    /// has the match of the nearest vertex that it kept.
+    #[getter]
+    fn followers<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<i32>>> {
+        let followers = &slf.get().inner.map.followers;
+        view(slf.as_any(), followers.len(), same_bytes(followers))
+    }
+
     /// Quality : How good the map is, told without ground truth.
     #[getter]
     fn quality<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -203,7 +203,7 @@ proptest! {
     #[test]
     fn point_maps_round_trip(targets in vec(prop_oneof![4 => 0..50u32, 1 => Just(PointMap::UNMATCHED)], 0..40)) {
         let map =
-            PointMap { confidence: Some(vec![0.25; targets.len()]), points: None, targets, n_target: 50 };
+            PointMap { confidence: Some(vec![0.25; targets.len()]), ..PointMap::new(targets, 50) };
         let folder = tempfile::tempdir().unwrap();
         for extension in ["txt", "vts", "npy", "csv"] {
             let path = folder.path().join(format!("map.{extension}"));

@@ -312,7 +312,7 @@ fn maps(name: &str, folder: &Path) -> Target {
     let path = folder.join(name);
     let (targets, confidence) = (vec![1, 0, PointMap::UNMATCHED], Some(vec![0.5, 1.0, 0.0]));
     let points = Some(vec![Some(SurfacePoint { face: 3, weights: [0.25, 0.5, 0.25] }), None, None]);
-    write_point_map(&path, &PointMap { targets, confidence, points, n_target: 2 }).unwrap();
+    write_point_map(&path, &PointMap { confidence, points, ..PointMap::new(targets, 2) }).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let wide: Vec<u8> = [&[0xFF, 0xFE][..], &bytes.iter().flat_map(|&b| [b, 0]).collect::<Vec<_>>()].concat();
     let seeds = if name == "map.npy" { vec![bytes] } else { vec![bytes, wide] };

@@ -13,6 +13,10 @@ use crate::Matrix;
 use header::Header;
 pub use header::NpyKind;
 
+/// Most bytes of an array in a `.npz` file: compressed, a few bytes may promise any number.
+#[cfg(not(target_arch = "wasm32"))]
+const MAX_ARRAY: u64 = 1 << 30;
+
 /// A number that `.npy` files can be read to and written from: `f64`, `f32`, `i32` or `i64`.
 pub trait NpyNumber: Copy + sealed::Sealed {}
 
@@ -220,6 +224,36 @@ pub(super) fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, Io
         Ok(archive.finish()?.into_inner())
     };
     written().map_err(|e| IoError::Write { path: path.into(), source: std::io::Error::other(e) })
+}
+
+/// There is no zip archive in WebAssembly.
+#[cfg(target_arch = "wasm32")]
+pub(super) fn read_npz<const N: usize>(_bytes: &[u8], _names: &[&str; N]) -> Parsed<[Option<Vec<u8>>; N]> {
+    let error = ParseError::part("file", ".npz files are not read in WebAssembly");
+    Err(error.with_remedy("pass the .npy files in it"))
+}
+
+/// The arrays of these names in a `.npz` file, as `.npy` files; none where it has no such array.
+#[cfg(not(target_arch = "wasm32"))]
+pub(super) fn read_npz<const N: usize>(bytes: &[u8], names: &[&str; N]) -> Parsed<[Option<Vec<u8>>; N]> {
+    use std::io::Read;
+    let wrong = |e: zip::result::ZipError| ParseError::part("file", format!("it is no .npz archive: {e}"));
+    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).map_err(wrong)?;
+    let mut arrays = [const { None }; N];
+    for (array, name) in arrays.iter_mut().zip(names) {
+        let entry = match archive.by_name(&format!("{name}.npy")) {
+            Err(zip::result::ZipError::FileNotFound) => continue,
+            other => other.map_err(|e| wrong(e).within(name))?,
+        };
+        let mut content = Vec::new();
+        let read = entry.take(MAX_ARRAY + 1).read_to_end(&mut content);
+        let n_bytes = read.map_err(|e| ParseError::part(*name, e.to_string()))?;
+        if n_bytes as u64 > MAX_ARRAY {
+            return Err(ParseError::part(*name, format!("the array has more than {MAX_ARRAY} bytes")));
+        }
+        *array = Some(content);
+    }
+    Ok(arrays)
 }
 
 fn write<T: NpyNumber>(path: &Path, shape: &str, data: &[T]) -> Result<(), IoError> {

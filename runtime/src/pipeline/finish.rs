@@ -93,6 +93,7 @@ fn in_input_vertices(
         targets: full.iter().map(|v| v.map_or(PointMap::UNMATCHED, |v| targets[v])).collect(),
         confidence: Some(full.iter().map(|v| v.map_or(0.0, |v| confidence[v])).collect()),
         points: points.map(|points| full.iter().map(|v| v.and_then(|v| points[v])).collect()),
+        followers: source.way_back.followers.clone(),
         n_target: target.n_input(),
     }
 }

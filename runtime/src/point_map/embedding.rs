@@ -56,7 +56,7 @@ impl Embedding<f32> {
                 if lengths > 0.0 { (product / lengths).clamp(0.0, 1.0) } else { 0.0 }
             };
             let confidence = Some(targets.par_iter().enumerate().map(cosine).collect());
-            PointMap { targets, confidence, points: None, n_target: rows[1 - from].rows() }
+            PointMap { confidence, ..PointMap::new(targets, rows[1 - from].rows()) }
         };
         [map(0, forth), map(1, back)]
     }
@@ -162,7 +162,7 @@ impl Embedding<f64> {
         let [forth, back] = self.matches()?;
         let map = |queries: &Matrix, rows: &Matrix, targets: Vec<u32>| {
             let confidence = Some(cosines(queries, rows, &targets));
-            PointMap { targets, confidence, points: None, n_target: rows.rows() }
+            PointMap { confidence, ..PointMap::new(targets, rows.rows()) }
         };
         Ok([map(&self.source, &self.target, forth), map(&self.target, &self.source, back)])
     }
@@ -207,7 +207,7 @@ impl Embedding<f64> {
 fn nearest(queries: &Matrix, rows: &Matrix) -> Result<PointMap, RecoverError> {
     let targets = NearestRows::new(rows)?.nearest(queries)?.index;
     let confidence = Some(cosines(queries, rows, &targets));
-    Ok(PointMap { targets, confidence, points: None, n_target: rows.rows() })
+    Ok(PointMap { confidence, ..PointMap::new(targets, rows.rows()) })
 }
 
 #[cfg(test)]

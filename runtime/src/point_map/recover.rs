@@ -128,7 +128,7 @@ pub(crate) fn recover_transported(
     basis_target: &Eigenbasis,
 ) -> Result<PointMap, RecoverError> {
     let (targets, confidence) = nearest_with_cosine(transported, &basis_target.eigenvectors)?;
-    Ok(PointMap { targets, confidence: Some(confidence), points: None, n_target: basis_target.n() })
+    Ok(PointMap { confidence: Some(confidence), ..PointMap::new(targets, basis_target.n()) })
 }
 
 /// For each query the nearest row, and the cosine of the angle between the two.

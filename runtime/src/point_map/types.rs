@@ -12,6 +12,9 @@ pub struct PointMap {
     /// The point on the target's surface that each source vertex goes to, `[n_source]`, finer than its vertex; none where a vertex
     /// has no match. `None` where the map is not known finer than to a vertex.
     pub points: Option<Vec<Option<SurfacePoint>>>,
+    /// Source vertices, ascending, that repair left out, of small pieces and of faces without area: each has the match of the nearest
+    /// vertex that it kept.
+    pub followers: Vec<u32>,
     /// Number of target vertices.
     pub n_target: usize,
 }
@@ -22,7 +25,7 @@ impl PointMap {
 
     /// A map without confidences.
     pub fn new(targets: Vec<u32>, n_target: usize) -> Self {
-        Self { targets, confidence: None, points: None, n_target }
+        Self { targets, confidence: None, points: None, followers: Vec::new(), n_target }
     }
 
     /// Number of source vertices.
@@ -38,6 +41,11 @@ impl PointMap {
     /// The target vertex of source vertex `source`, if there is such a vertex and it has one.
     pub fn get(&self, source: usize) -> Option<u32> {
         self.targets.get(source).copied().filter(|&target| target != Self::UNMATCHED)
+    }
+
+    /// Whether source vertex `source` has the match of another.
+    pub fn follows(&self, source: usize) -> bool {
+        u32::try_from(source).is_ok_and(|source| self.followers.binary_search(&source).is_ok())
     }
 
     /// The target of each source vertex in turn, `None` where it has none.

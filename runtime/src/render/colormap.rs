@@ -68,7 +68,7 @@ mod tests {
             assert!(far(colors[v], colors[opposite.unwrap()]), "vertex {v} and its antipode look alike");
         }
         let targets = vec![5, PointMap::UNMATCHED];
-        let map = PointMap { targets, confidence: None, points: None, n_target: mesh.n_vertices() };
+        let map = PointMap::new(targets, mesh.n_vertices());
         assert_eq!(map_colors(&map, &colors), vec![colors[5], UNMATCHED_COLOR]);
     }
 }

@@ -139,7 +139,7 @@ mod tests {
     fn the_page_is_complete_and_names_cannot_break_it() {
         let mesh = icosphere(1);
         let n = mesh.n_vertices();
-        let map = PointMap { targets: (0..n as u32).collect(), confidence: None, points: None, n_target: n };
+        let map = PointMap::new((0..n as u32).collect(), n);
         let page = viewer_html(&ViewerPair {
             title: "a <b> & c",
             name_source: "</script>",

@@ -108,7 +108,7 @@ impl Clone for Shape {
 const CARRIED_WITHIN: f64 = 0.05;
 
 /// Raise where repair, subdivision or decimation give another mesh.
-const MESH_VERSION: u32 = 4;
+const MESH_VERSION: u32 = 5;
 
 impl Shape {
     /// Repairs and, where it is smaller or larger than the options say, subdivides or decimates a mesh as read; `name` is for
@@ -259,13 +259,33 @@ impl Shape {
         part
     }
 
+    /// The mirror image of the working mesh, whose vertices are those of this one and whose faces are turned round, so that its normals are
+    /// outside again. It is whole.
+    pub fn mirrored(&self) -> Self {
+        let mesh = self.mesh();
+        let vertices = mesh.vertices().iter().map(|&[x, y, z]| [-x, y, z]).collect();
+        let faces = mesh.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
+        Self {
+            name: self.name.clone(),
+            full_mesh: Mesh::new(vertices, faces).expect("the mirror image of a valid mesh is valid"),
+            decimated: None,
+            input: None,
+            warnings: String::new(),
+            way_back: WayBack::identity(mesh.n_vertices()),
+            whole_area: None,
+            key: CacheKey::of(&[self.key.as_bytes(), b"mirrored"]),
+            store: Mutex::new(self.store().of_mirror_image()),
+        }
+    }
+
     fn encode(&self) -> Vec<u8> {
         let mut out = Encoder::default();
         encode_mesh(&mut out, &self.full_mesh);
         out.value(u8::from(self.input.is_some()));
         self.input.iter().for_each(|input| encode_mesh(&mut out, input));
         out.slice(self.warnings.as_bytes());
-        out.slice(&self.way_back.input_of_full).slice(&self.way_back.full_of_input);
+        let WayBack { input_of_full, full_of_input, followers, .. } = &self.way_back;
+        out.slice(input_of_full).slice(full_of_input).slice(followers);
         let decimated = self.decimated.as_ref().zip(self.way_back.full_of_work.as_ref());
         out.value(u8::from(decimated.is_some()));
         if let Some((mesh, injection)) = decimated {
@@ -283,13 +303,13 @@ impl Shape {
             _ => Some(decode_mesh(&mut input)?),
         };
         let warnings = String::from_utf8(input.slice()?).ok()?;
-        let (input_of_full, full_of_input) = (input.slice()?, input.slice()?);
+        let (input_of_full, full_of_input, followers) = (input.slice()?, input.slice()?, input.slice()?);
         let (mut decimated, mut full_of_work) = (None, None);
         if input.value::<u8>()? != 0 {
             decimated = Some(decode_mesh(&mut input)?);
             full_of_work = Some(input.slice()?);
         }
-        let way_back = WayBack { input_of_full, full_of_input, full_of_work };
+        let way_back = WayBack { input_of_full, full_of_input, followers, full_of_work };
         let n_input = as_read.as_ref().unwrap_or(&full_mesh).n_vertices();
         let fits = way_back.fits(&full_mesh, decimated.as_ref()) && way_back.full_of_input.len() == n_input;
         let meshes = Meshes { full_mesh, decimated, input: as_read, warnings };

@@ -11,9 +11,12 @@ pub(super) fn warnings(mesh: &Mesh, repaired: &Repaired) -> String {
     let mut lines = Vec::new();
     let dropped = repaired.dropped_vertices.len();
     if dropped > 0 {
+        let pieces = match repaired.report.dropped_components {
+            0 => "faces without area".into(),
+            count => format!("{count} small pieces"),
+        };
         lines.push(format!(
-            "{} small pieces, {dropped} of {} vertices, follow the nearest vertex of the rest",
-            repaired.report.dropped_components,
+            "{dropped} of {} vertices, of {pieces}, follow the nearest vertex of the rest",
             mesh.n_vertices()
         ));
     }

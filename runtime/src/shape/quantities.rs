@@ -15,10 +15,11 @@ use crate::cache::{CacheKey, Decoder, Encoder};
 use crate::descriptor::{ShotOptions, shot};
 use crate::error::Error;
 use crate::events::{Event, timed};
+use crate::memory::{self, Remedy};
 use crate::spectral::{
     EigenGradients, EigenOptions, Eigenbasis, Laplacian, WksOptions, eigen_gradients, eigenbasis, wks,
 };
-use crate::{Matrix, Mesh, memory};
+use crate::{Matrix, Mesh};
 use std::sync::{Arc, MutexGuard, PoisonError};
 
 /// Versions of the quantities: raise one whenever its numbers or their encoding change.
@@ -37,6 +38,11 @@ pub(super) struct Store {
 }
 
 impl Store {
+    /// What the mirror image has, too.
+    pub(super) fn of_mirror_image(&self) -> Self {
+        Self { laplacian: self.laplacian.clone(), eigenbasis: self.eigenbasis.clone(), ..Self::default() }
+    }
+
     /// Forgets what depends on the area that counts as 1.
     pub(super) fn forget_sizes(&mut self) {
         self.gradients = None;
@@ -73,8 +79,8 @@ impl Shape {
         if let Some(basis) = self.store().eigenbasis.as_ref().filter(|basis| basis.k() >= k) {
             return Ok(basis.clone());
         }
-        let compute =
-            || self.compute_eigenbasis(self.mesh(), &self.laplacian(), k, memory::DECIMATE, context);
+        let remedy = Remedy::Decimate { vertices: self.n() };
+        let compute = || self.compute_eigenbasis(self.mesh(), &self.laplacian(), k, remedy, context);
         let basis =
             self.cached_basis("eigenbasis", k, context, compute).map_err(|e| e.in_shape(&self.name))?;
         self.store().eigenbasis = Some(basis.clone());
@@ -230,7 +236,7 @@ impl Shape {
         mesh: &Mesh,
         laplacian: &Laplacian,
         k: usize,
-        remedy: &'static str,
+        remedy: Remedy,
         context: Context,
     ) -> Result<Eigenbasis, Error> {
         let needed = memory::eigenbasis_bytes(mesh.n_vertices(), k);
@@ -253,7 +259,8 @@ impl Shape {
     }
 
     fn compute_shot(&self, options: &ShotOptions, context: Context) -> Result<Matrix<f32>, Error> {
-        let _reserved = memory::reserve("SHOT", memory::descriptor_bytes(self.n(), 0), memory::DECIMATE)?;
+        let remedy = Remedy::Decimate { vertices: self.n() };
+        let _reserved = memory::reserve("SHOT", memory::descriptor_bytes(self.n(), 0), remedy)?;
         let relative_scale = self.whole_area.map_or(1.0, |whole| (whole / self.mesh().area()).sqrt());
         let scaled = ShotOptions { radius: options.radius * relative_scale, ..*options };
         let (descriptors, info) = timed(context.observer, &self.name, "shot", || shot(self.mesh(), &scaled))?;

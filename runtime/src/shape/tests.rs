@@ -123,8 +123,9 @@ fn small_pieces_follow_the_rest_and_are_named_each_time() {
         let shape = Shape::new("coat", &mesh, &ShapeOptions::default(), context).unwrap();
         assert_eq!(shape.mesh(), &body);
         let events = events.into_inner().unwrap();
-        let named = events.iter().any(|event| matches!(event, Event::Warning(text) if text.starts_with("coat: 1 small pieces, 42 of 684 ")));
+        let named = events.iter().any(|event| matches!(event, Event::Warning(text) if text.starts_with("coat: 42 of 684 vertices, of 1 small pieces, ")));
         assert!(named, "{events:?}");
+        assert_eq!(shape.way_back.followers, (0..42).collect::<Vec<u32>>());
         for v in 0..42 {
             let full = shape.way_back.full_of_input[v];
             let distance = crate::mesh::vec3::distance(body.vertices()[full as usize], at);

@@ -9,9 +9,11 @@ use crate::mesh::{Repaired, nearest_vertices};
 pub struct WayBack {
     /// Input vertex of each vertex of the full mesh, of one that subdivision made the nearest, `[n_full]`.
     pub input_of_full: Vec<u32>,
-    /// For each input vertex its vertex of the full mesh, `[n_input]`: of one in a small piece that repair left out the nearest,
-    /// of one without a face [`WayBack::NONE`].
+    /// For each input vertex its vertex of the full mesh, `[n_input]`: of one that repair left out the nearest, of one without a face
+    /// [`WayBack::NONE`].
     pub full_of_input: Vec<u32>,
+    /// Input vertices that repair left out, ascending: of small pieces and of faces without area.
+    pub followers: Vec<u32>,
     /// For each vertex of the decimated mesh its vertex of the full mesh, `[n]`; `None` where nothing was decimated.
     pub full_of_work: Option<Vec<u32>>,
 }
@@ -29,7 +31,19 @@ impl WayBack {
         for (&vertex, nearest) in dropped.iter().zip(nearest_vertices(full.vertices(), &places)) {
             full_of_input[vertex as usize] = nearest;
         }
-        Self { input_of_full: repaired.input_of_repaired.clone(), full_of_input, full_of_work: None }
+        let followers = dropped.clone();
+        Self {
+            input_of_full: repaired.input_of_repaired.clone(),
+            full_of_input,
+            followers,
+            full_of_work: None,
+        }
+    }
+
+    /// Of a mesh that nothing was done to.
+    pub(super) fn identity(n: usize) -> Self {
+        let all: Vec<u32> = (0..n as u32).collect();
+        Self { input_of_full: all.clone(), full_of_input: all, followers: Vec::new(), full_of_work: None }
     }
 
     /// The same for a subdivided full mesh, of which the nearest vertices of the one before are given, `[n_full]`.
@@ -80,5 +94,6 @@ impl WayBack {
             && self.input_of_full.len() == full.n_vertices()
             && below(&self.input_of_full, self.full_of_input.len())
             && self.full_of_input.iter().all(or_none)
+            && below(&self.followers, self.full_of_input.len())
     }
 }

@@ -161,7 +161,7 @@ pub(crate) struct BatchArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Format of the maps
-    #[arg(long, value_name = "EXT", default_value = "txt", value_parser = ["txt", "vts", "npy", "csv"])]
+    #[arg(long, value_name = "EXT", default_value = "txt", value_parser = ["txt", "vts", "npy", "csv", "npz"])]
     pub(crate) format: String,
     /// Every source is a part of a shape and its target the whole, in the same unit of length
     #[arg(long)]
@@ -182,7 +182,7 @@ pub(crate) struct TransferArgs {
     pub(crate) source: PathBuf,
     /// Target mesh of the map
     pub(crate) target: PathBuf,
-    /// The map: for each source vertex a target vertex (.txt, .vts, .npy or .csv)
+    /// The map: for each source vertex a target vertex (.txt, .vts, .npy, .csv or .npz)
     #[arg(long)]
     pub(crate) map: PathBuf,
     /// Which mesh receives. `source` takes from the target what each vertex is matched to. `target` takes from the

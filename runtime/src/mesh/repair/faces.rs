@@ -12,19 +12,28 @@ pub(crate) fn weld(mesh: &Mesh) -> Vec<u32> {
     mesh.vertices().iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
 }
 
-/// The faces, by index and welded vertices, that have an area and whose vertices no earlier face has.
-pub(super) fn proper_faces(mesh: &Mesh, welded: &[u32], report: &mut RepairReport) -> Vec<(u32, [u32; 3])> {
+/// The faces, by index and welded vertices, that have an area and whose vertices no earlier face has; and those without area.
+pub(super) fn proper_faces(
+    mesh: &Mesh,
+    welded: &[u32],
+    report: &mut RepairReport,
+) -> (Vec<(u32, [u32; 3])>, Vec<u32>) {
     let diagonal = mesh.diagonal();
     let faces = mesh.faces().iter().map(|face| face.map(|i| welded[i as usize]));
     let mut kept: Vec<(u32, [u32; 3])> = (0..).zip(faces).collect();
+    let mut degenerate = Vec::new();
     kept.retain(|&(f, [a, b, c])| {
-        a != b && b != c && c != a && !is_degenerate(mesh.corners(f as usize), diagonal)
+        let proper = a != b && b != c && c != a && !is_degenerate(mesh.corners(f as usize), diagonal);
+        if !proper {
+            degenerate.push(f);
+        }
+        proper
     });
-    report.degenerate_faces = mesh.n_faces() - kept.len();
+    report.degenerate_faces = degenerate.len();
     let repeated = repeated_faces(&kept);
     report.duplicate_faces = repeated.len();
     kept.retain(|(f, _)| repeated.binary_search(f).is_err());
-    kept
+    (kept, degenerate)
 }
 
 /// The faces, ascending, whose vertices are those of an earlier one in whatever order.

@@ -43,7 +43,8 @@ pub struct Repaired {
     pub repaired_of_input: Vec<Option<u32>>,
     /// For every vertex of `mesh` an input vertex at the same position, `[n_repaired]`.
     pub input_of_repaired: Vec<u32>,
-    /// Input vertices without counterpart whose faces went with a tiny component, ascending.
+    /// Input vertices without counterpart that have a place on the surface, ascending: all their faces were of tiny components or
+    /// without area.
     pub dropped_vertices: Vec<u32>,
     /// What was done.
     pub report: RepairReport,
@@ -66,9 +67,9 @@ pub struct RepairReport {
     pub unorientable_edges: usize,
     /// Components dropped for their size.
     pub dropped_components: usize,
-    /// Input vertices of those, which follow the nearest vertex that remains.
+    /// Input vertices of those and of degenerate faces, which follow the nearest vertex that remains.
     pub dropped_vertices: usize,
-    /// Input vertices without counterpart: of no face, or only of faces that were dropped.
+    /// Input vertices of no face.
     pub unmatched_vertices: usize,
 }
 
@@ -89,7 +90,7 @@ impl fmt::Display for RepairReport {
             (self.flipped_faces, "faces turned round"),
             (self.unorientable_edges, "edges left that cannot be oriented"),
             (self.dropped_components, "tiny components left out"),
-            (self.dropped_vertices, "vertices of those follow the nearest of the rest"),
+            (self.dropped_vertices, "vertices without a face left follow the nearest of the rest"),
             (self.unmatched_vertices, "vertices left without a match"),
         ];
         let done: Vec<String> =
@@ -155,12 +156,13 @@ pub fn repair(mesh: &Mesh, options: &RepairOptions) -> Result<Repaired, RepairEr
     }
     let mut report = RepairReport::default();
     let welded = if options.weld { weld_near(mesh) } else { (0..mesh.n_vertices() as u32).collect() };
-    let kept = faces::proper_faces(mesh, &welded, &mut report);
+    let (kept, degenerate) = faces::proper_faces(mesh, &welded, &mut report);
     if kept.is_empty() {
         let corners = mesh.corners(0);
         return Err(RepairError::NoArea { n_faces: mesh.n_faces(), example: 0, corners });
     }
     let mut sheets = cut::cut_apart(mesh, &welded, kept);
+    sheets.dropped_faces = degenerate;
     drop_tiny_components(mesh, &mut sheets, options.min_component_area, &mut report);
     let flipped = orient::orient(mesh, &sheets, &mut report);
     Ok(assemble(mesh, &welded, &sheets, &flipped, report))
@@ -174,7 +176,7 @@ struct Sheets {
     faces: Vec<[u32; 3]>,
     /// The welded vertex of each fan, ascending.
     vertex_of_fan: Vec<u32>,
-    /// The input faces of dropped components.
+    /// The input faces without area and those of dropped components.
     dropped_faces: Vec<u32>,
 }
 
@@ -202,7 +204,7 @@ fn drop_tiny_components(mesh: &Mesh, sheets: &mut Sheets, min_area: f64, report:
         let mut kept = keep.iter();
         sheets.faces.retain(|_| *kept.next().expect("one flag per face"));
         let dropped = sheets.input_faces.iter().zip(&keep).filter(|(_, keep)| !**keep);
-        sheets.dropped_faces = dropped.map(|(&face, _)| face).collect();
+        sheets.dropped_faces.extend(dropped.map(|(&face, _)| face));
         let mut kept = keep.iter();
         sheets.input_faces.retain(|_| *kept.next().expect("one flag per face"));
     }

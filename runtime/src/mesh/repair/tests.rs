@@ -82,7 +82,7 @@ fn defects_of_the_zoo_are_repaired_as_counted() {
     );
     assert_eq!(
         report(shapes::with_degenerate_faces()),
-        RepairReport { degenerate_faces: 3, unmatched_vertices: 1, ..none() }
+        RepairReport { degenerate_faces: 3, dropped_vertices: 1, ..none() }
     );
     assert_eq!(
         report(shapes::with_duplicates()),

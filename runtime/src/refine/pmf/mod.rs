@@ -163,7 +163,7 @@ pub fn pmf(
     filter.targets = carried.map_or(filter.targets, |carried| carried.0);
     let left_over = filter.complete(&assigner, around);
     let confidence = Some(cosines(&filter.averages, &target.rows, &filter.targets));
-    let map = PointMap { targets: filter.targets, confidence, points: None, n_target: basis_target.n() };
+    let map = PointMap { confidence, ..PointMap::new(filter.targets, basis_target.n()) };
     let functional_map = functional_map_of(&map, basis_source, basis_target)?;
     Ok(Refined { map, functional_map, info: PmfInfo { changed: filter.changed, left_over, edges_kept } })
 }
