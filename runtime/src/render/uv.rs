@@ -13,6 +13,9 @@ type Uv = [f32; 2];
 /// A triangle may be stretched so much more than the giver's there (squared: four times in length) before it counts as across a seam.
 const MOST_STRETCHED: f64 = 16.0;
 
+/// A place with weights as near to 0 or 1 as this is on an edge or at a corner.
+const AT: f64 = 1e-6;
+
 /// Texture coordinates `[m_receiver, 3, 2]` from the giver's `[m_giver, 3, 2]`.
 ///
 /// Triangles whose donors are the corners of a giver's triangle take its coordinates as they are. Others take those that their
@@ -73,8 +76,13 @@ impl<'a> Giver<'a> {
     }
 
     fn spot(&self, donors: &Donors, receiving: usize) -> Option<Spot> {
-        let vertex = donors.vertex(receiving)?;
-        let blend = donors.blend(receiving);
+        let mut vertex = donors.vertex(receiving)?;
+        let mut blend = donors.blend(receiving);
+        // A place at a corner is that vertex, with the coordinates of all sides of a seam.
+        if let Some((corner, face)) = blend.and_then(|b| Some((corner_of(b.weights)?, b.face))) {
+            vertex = self.mesh.faces()[face as usize][corner];
+            blend = None;
+        }
         let point = match blend {
             Some(blend) => combine(blend.weights, self.mesh.corners(blend.face as usize)),
             None => self.mesh.vertices()[vertex as usize],
@@ -105,12 +113,27 @@ impl<'a> Giver<'a> {
         })
     }
 
-    /// The coordinates that a spot may have: one within a triangle, at a vertex one for each side of a seam.
+    /// The coordinates that a spot may have: one within a triangle, on an edge or at a vertex one for each side of a seam.
     fn choices(&self, spot: &Spot) -> Vec<(Uv, u32)> {
-        match spot.blend {
-            Some(blend) => vec![(self.within(blend), self.chart_of_face[blend.face as usize])],
-            None => self.of_vertex[spot.vertex as usize].clone(),
-        }
+        let Some(blend) = spot.blend else { return self.of_vertex[spot.vertex as usize].clone() };
+        let on = |blend: Blend| (self.within(blend), self.chart_of_face[blend.face as usize]);
+        std::iter::once(blend).chain(self.across_the_edge(blend)).map(on).collect()
+    }
+
+    /// The same place in the other triangles of the edge that it is on.
+    fn across_the_edge(&self, Blend { face, weights }: Blend) -> Vec<Blend> {
+        let Some(outer) = weights.iter().position(|&w| w < AT) else { return Vec::new() };
+        let [a, b] = [(outer + 1) % 3, (outer + 2) % 3];
+        let corners = self.mesh.faces()[face as usize];
+        let in_other = |&other: &u32| {
+            let there = self.mesh.faces()[other as usize];
+            let at = |corner: usize| there.iter().position(|&v| v == corners[corner]);
+            let mut moved = [0.0; 3];
+            (moved[at(a)?], moved[at(b)?]) = (weights[a], weights[b]);
+            Some(Blend { face: other, weights: moved })
+        };
+        let around = &self.faces_of[corners[a] as usize];
+        around.iter().filter(|&&other| other != face).filter_map(in_other).collect()
     }
 
     fn within(&self, blend: Blend) -> Uv {
@@ -190,6 +213,11 @@ fn charts(mesh: &Mesh, uvs: &[[Uv; 3]]) -> Vec<u32> {
         }
     }
     (0..mesh.n_faces() as u32).map(|f| root(&mut parent, f)).collect()
+}
+
+/// The corner that a place is at.
+fn corner_of(weights: [f64; 3]) -> Option<usize> {
+    weights.iter().position(|&w| w > 1.0 - AT)
 }
 
 /// Sum of the squared sides of a triangle in the texture.

@@ -1,6 +1,6 @@
 use super::*;
-use crate::mesh::nearest_vertices;
 use crate::mesh::shapes::{icosphere, permuted};
+use crate::mesh::{nearest_vertices, vertices_on_surface};
 use crate::point_map::PointMap;
 
 /// Longitude and latitude as texture coordinates, with a seam where the longitude wraps.
@@ -80,10 +80,41 @@ fn every_triangle_is_in_one_chart() {
 #[test]
 fn a_mesh_gives_itself_its_own_coordinates() {
     let mesh = icosphere(3);
-    let donors = Donors::of_source(&PointMap::new((0..642).collect(), 642));
-    for uvs in [globe(&mesh), die(&mesh)] {
-        assert_eq!(corner_uvs(&mesh, &uvs, &mesh, &donors), uvs);
+    let map = PointMap::new((0..642).collect(), 642);
+    let points = PointMap { points: Some(vertices_on_surface(&mesh)), ..map.clone() };
+    let donors = Donors::of_source(&map);
+    let on_surface = donors.clone().on_surface(&points, &mesh).unwrap();
+    for donors in [donors, on_surface] {
+        for uvs in [globe(&mesh), die(&mesh)] {
+            assert_eq!(corner_uvs(&mesh, &uvs, &mesh, &donors), uvs);
+        }
     }
+}
+
+#[test]
+fn a_place_on_the_edge_of_a_seam_takes_either_side() {
+    let mesh = icosphere(1);
+    let uvs = die(&mesh);
+    let giver = Giver::new(&mesh, &uvs);
+    let chart = |f: u32| giver.chart_of_face[f as usize];
+    let on_edge = |face: u32, outer: usize| {
+        let mut weights = [0.5; 3];
+        weights[outer] = 0.0;
+        let point = combine(weights, mesh.corners(face as usize));
+        (face, Spot { point, vertex: 0, blend: Some(Blend { face, weights }) })
+    };
+    let mut seams = 0;
+    for (face, spot) in (0..80).flat_map(|face| [0, 1, 2].map(|outer| on_edge(face, outer))) {
+        let choices = giver.choices(&spot);
+        assert_eq!(choices.len(), 2);
+        assert_eq!(choices[0].1, chart(face));
+        if choices[1].1 == chart(face) {
+            assert_eq!(choices[0], choices[1]);
+        } else {
+            seams += 1;
+        }
+    }
+    assert!(seams > 20, "{seams}");
 }
 
 #[test]
