@@ -8,7 +8,7 @@ use crate::run::run;
 use crate::stages::in_map;
 use fmnet::eval::{ErrorSummary, GroundTruth, geodesic_errors, surface_errors, symmetric_geodesic_errors};
 use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
-use fmnet::memory;
+use fmnet::memory::{self, Remedy};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -48,7 +48,7 @@ pub(crate) fn geodesic_distances<'py>(
             .map_err(|v| said(format!("sources: there is no vertex {v}; the mesh has {n} (0-based)")))?;
         let needed = 4 * n as u64 * sources.len() as u64;
         let _reserved =
-            memory::reserve("the distances", needed, "ask for those from fewer sources at a time")?;
+            memory::reserve("the distances", needed, Remedy::Other("ask for those from fewer sources at a time"))?;
         Ok(GeodesicSolver::new(&mesh, &GeodesicOptions::default()).from_sources(&sources))
     })?;
     let n = distances.cols();

@@ -7,7 +7,7 @@ use crate::options::{named, weight};
 use crate::run::run;
 use fmnet::descriptor::{ShotOptions, shot as compute_shot};
 use fmnet::fmap::{FmapSolver, SolverKind, functional_map as solve};
-use fmnet::memory;
+use fmnet::memory::{self, Remedy};
 use fmnet::point_map::{Comparison, PointMap, recover_by};
 use fmnet::refine::{ZoomOutOptions, zoomout as refine};
 use fmnet::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis as compute_eigenbasis};
@@ -43,7 +43,7 @@ pub(crate) fn eigenbasis<'py>(
         let mesh = input.load_mesh("mesh", observer)?;
         let needed = memory::eigenbasis_bytes(mesh.n_vertices(), k);
         let _reserved =
-            memory::reserve("the eigenbasis", needed, "ask for fewer pairs, or decimate the mesh")?;
+            memory::reserve("the eigenbasis", needed, Remedy::Other("ask for fewer pairs, or decimate the mesh"))?;
         let (basis, info) = compute_eigenbasis(&Laplacian::new(&mesh), k, &EigenOptions::default())?;
         if info.complete == Some(false) {
             let text = format!(
@@ -87,7 +87,7 @@ pub(crate) fn shot<'py>(
     let descriptors = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
         let _reserved =
-            memory::reserve("SHOT", memory::descriptor_bytes(mesh.n_vertices(), 0), "decimate the mesh")?;
+            memory::reserve("SHOT", memory::descriptor_bytes(mesh.n_vertices(), 0), Remedy::Other("decimate the mesh"))?;
         Ok(compute_shot(&mesh, &options)?.0)
     })?;
     Ok(out_matrix(py, descriptors)?.into_any())

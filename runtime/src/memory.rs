@@ -5,12 +5,14 @@
 //! them with what was measured. On Linux the memory available is the least of what the machine, the control group and the
 //! limit of the address space leave, in WebAssembly what 32-bit addresses do; elsewhere it is not known and nothing is refused.
 
+use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
 
 /// A stage would take more memory than there is.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("{stage} would take about {}, but {} are available; {remedy}", size(*.needed), size(*.available))]
+#[error("{stage} would take about {}, but {} are available; {}", size(*.needed), size(*.available),
+    remedy.at(*.available as f64 / *.needed as f64))]
 pub struct MemoryError {
     /// The stage.
     pub stage: &'static str,
@@ -19,16 +21,50 @@ pub struct MemoryError {
     /// What there is, in bytes, less what is set aside for stages that run at the same time.
     pub available: u64,
     /// What to do about it.
-    pub remedy: &'static str,
+    pub remedy: Remedy,
 }
 
-/// The remedy where a mesh is too large as it is.
-pub(crate) const DECIMATE: &str =
-    "decimate the mesh (--decimate N), ask for fewer eigenfunctions (-k N) or free some memory";
+/// What to do where the memory does not suffice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// Decimate to fewer vertices than the shape has.
+    Decimate {
+        /// Those that it has.
+        vertices: usize,
+    },
+    /// What this says.
+    Other(&'static str),
+}
 
 /// The remedy where the full mesh is too large to upscale a map to.
-pub(crate) const FULL: &str =
-    "decimate the mesh with another program before matching it, or free some memory";
+pub(crate) const FULL: Remedy =
+    Remedy::Other("decimate the mesh with another program before matching it, or free some memory");
+
+/// Fewer vertices make no map.
+const FEWEST: usize = 500;
+
+impl Remedy {
+    /// The advice where `share` of the memory is there.
+    fn at(&self, share: f64) -> impl fmt::Display {
+        match self {
+            Self::Other(text) => (*text).to_string(),
+            // A tenth less than what would just fit, in two digits.
+            Self::Decimate { vertices } => match two_digits(0.9 * share * *vertices as f64) {
+                fewer if fewer >= FEWEST => format!(
+                    "decimate the mesh (--decimate {fewer}), ask for fewer eigenfunctions (-k N) or free some memory"
+                ),
+                _ => "free some memory".to_string(),
+            },
+        }
+    }
+}
+
+/// The number rounded down to two digits.
+fn two_digits(number: f64) -> usize {
+    let unit = 10f64.powi((number.max(1.0).log10().floor() as i32 - 1).max(0));
+    ((number / unit).floor() * unit) as usize
+}
 
 fn size(bytes: u64) -> String {
     let mebibytes = bytes as f64 / f64::from(1 << 20);
@@ -89,7 +125,7 @@ fn ledger() -> MutexGuard<'static, Ledger> {
 ///
 /// # Errors
 /// Where more is needed than available; never where that is not known.
-pub fn reserve(stage: &'static str, needed: u64, remedy: &'static str) -> Result<Reservation, MemoryError> {
+pub fn reserve(stage: &'static str, needed: u64, remedy: Remedy) -> Result<Reservation, MemoryError> {
     let mut ledger = ledger();
     if ledger.reserved == 0 {
         ledger.available = available();
@@ -191,11 +227,11 @@ mod tests {
     #[test]
     fn what_is_set_aside_is_not_given_twice() {
         let Some(all) = available() else { return };
-        let refused = reserve("a test", u64::MAX / 2, "ask for less").unwrap_err();
+        let refused = reserve("a test", u64::MAX / 2, Remedy::Other("ask for less")).unwrap_err();
         assert!(refused.to_string().starts_with("a test would take about"), "{refused}");
-        let half = reserve("a test", all / 2, "ask for less");
+        let half = reserve("a test", all / 2, Remedy::Other("ask for less"));
         if let Ok(half) = half {
-            let second = reserve("a test", all / 4 * 3, "ask for less").unwrap_err();
+            let second = reserve("a test", all / 4 * 3, Remedy::Other("ask for less")).unwrap_err();
             assert!(second.available <= all - all / 4, "{second}");
             drop(half);
         }
@@ -213,6 +249,18 @@ mod tests {
         assert_eq!(linux::address_limit(limits), Some(2048));
         assert_eq!(linux::address_limit("Max address space  unlimited unlimited bytes\n"), None);
         assert!(linux::machine().is_some_and(|bytes| bytes > 1 << 20));
+    }
+
+    #[test]
+    fn the_remedy_names_a_number_of_vertices_that_fits() {
+        let error = |available, vertices| {
+            let remedy = Remedy::Decimate { vertices };
+            MemoryError { stage: "a test", needed: 100 << 20, available, remedy }.to_string()
+        };
+        let text = error(50 << 20, 27_654);
+        assert!(text.ends_with("50 MiB are available; decimate the mesh (--decimate 12000), ask for fewer eigenfunctions (-k N) or free some memory"), "{text}");
+        assert!(error(50 << 20, 1000).ends_with("available; free some memory"));
+        assert_eq!([0.0, 7.9, 99.0, 101.0, 12_444.0].map(two_digits), [0, 7, 99, 100, 12_000]);
     }
 
     #[test]
