@@ -26,7 +26,7 @@ const WORTH_A_TRY: f64 = 0.2;
 
 /// Another map is taken if its expected error is below this share of the one so far: the estimate does not tell smaller
 /// differences.
-const CLEARLY: f64 = 0.9;
+pub(super) const CLEARLY: f64 = 0.9;
 
 /// A map before refinement, both ways.
 #[derive(Clone)]
@@ -87,6 +87,15 @@ impl Tried {
         better
     }
 
+    /// Calls the map taken doubtful.
+    pub(super) fn doubt(&mut self) {
+        self.estimate.doubtful = true;
+        self.candidates
+            .iter_mut()
+            .filter(|candidate| candidate.taken)
+            .for_each(|c| c.estimate.doubtful = true);
+    }
+
     /// Calls the map taken doubtful from half the usual probability on, where it is not the first: the best of several looks better than it
     /// is.
     fn doubt_the_best(&mut self, usual: f64) {
@@ -117,8 +126,9 @@ impl Pair<'_> {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             self.attempt("without descriptors beside", &start, judge, &mut tried)?;
         }
+        let is_torn = more && self.try_other_side(judge, &mut tried, landmarks)?;
         let asked_to_adapt = self.matcher.adapt.is_some_and(|steps| steps > 0);
-        if all || more && tried.estimate.doubtful {
+        if all || is_torn || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;
         } else if asked_to_adapt && !self.is_part() {
             self.try_adapted(judge, &mut tried, landmarks)?;

@@ -8,7 +8,7 @@ use std::path::Path;
 
 const MAGIC: &[u8; 8] = b"FMNETS\0\0";
 /// Raise where the encoding, or what descriptors are computed from, changes.
-const FORMAT_VERSION: u32 = 1;
+const FORMAT_VERSION: u32 = 2;
 const HEADER_LEN: usize = 8 + 4 + 32;
 
 /// A shape with its descriptors.

@@ -5,7 +5,7 @@ use crate::cache::{CacheKey, Decoder, Encoder};
 use crate::descriptor::ShotOptions;
 use crate::error::Error;
 use crate::events::timed;
-use crate::memory;
+use crate::memory::{self, Remedy};
 use crate::network::DescriptorNetwork;
 use crate::network::contract::{ModelInput, Quantity};
 use crate::shape::{Context, Shape};
@@ -86,7 +86,8 @@ impl Descriptor for NetworkDescriptor {
         }
         let width = self.network.contract().inputs.iter().map(|input| input.width).sum();
         let needed = memory::network_bytes(shape.n(), width);
-        let _reserved = memory::reserve("the network", needed, memory::DECIMATE)
+        let remedy = Remedy::Decimate { vertices: shape.n() };
+        let _reserved = memory::reserve("the network", needed, remedy)
             .map_err(|e| Error::from(e).in_shape(&shape.name))?;
         let inputs = self.inputs(shape, context)?;
         let arrays: Vec<&[f32]> = inputs.iter().map(|(_, values)| values.as_slice()).collect();

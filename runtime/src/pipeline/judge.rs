@@ -3,7 +3,7 @@
 use super::pair::Pair;
 use super::refine::Found;
 use crate::error::Error;
-use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, doubt};
+use crate::quality::{Estimate, Quality, SPECTRAL_K, Side, SurfaceFrame, displaced_regions, doubt};
 use crate::shape::Shape;
 use crate::spectral::{Eigenbasis, Laplacian};
 use std::sync::Arc;
@@ -38,6 +38,12 @@ impl Judge<'_> {
         let [source, target] = self.sides();
         doubt(&found.map, found.back.as_ref(), source, target)
     }
+
+    /// Regions of the source that a map has torn off and sent elsewhere, the largest first.
+    pub(super) fn displaced_regions(&self, found: &Found) -> Vec<Vec<u32>> {
+        let [source, target] = self.sides();
+        displaced_regions(&found.map, source, target)
+    }
 }
 
 impl Pair<'_> {
@@ -54,7 +60,7 @@ impl Pair<'_> {
         })
     }
 
-    pub(super) fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate) {
+    pub(super) fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate, is_torn_off: bool) {
         if quality.is_mirrored() {
             self.warn(&format!(
                 "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
@@ -68,7 +74,7 @@ impl Pair<'_> {
             self.warn(&format!(
                 "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
                 estimate.expected_error,
-                quality.complaint()
+                if is_torn_off { "parts of it are torn off, as where limbs are exchanged" } else { quality.complaint() }
             ));
         }
     }

@@ -19,6 +19,7 @@ mod finish;
 mod judge;
 mod landmarks;
 mod options;
+mod other_side;
 mod pair;
 mod part_size;
 mod refine;

@@ -9,7 +9,7 @@ use crate::Matrix;
 use crate::error::Error;
 use crate::events::{Event, timed};
 use crate::fmap::{BothMaps, FmapInfo, FmapSolver, functional_maps};
-use crate::memory;
+use crate::memory::{self, Remedy};
 use crate::point_map::search::AlongEdges;
 use crate::point_map::{Comparison, Embedding, PointMap, RecoverError};
 use crate::shape::Context;
@@ -50,19 +50,27 @@ impl Pair<'_> {
         let width = self.refined_k().max(matcher.k) * 2 + own[0].cols();
         let [n_source, n_target] = [&self.source.shape, &self.target.shape].map(|shape| shape.n());
         let needed = memory::search_bytes(n_source, n_target, width);
-        let reserved = memory::reserve("the search for nearest neighbours", needed, memory::DECIMATE)?;
+        let remedy = Remedy::Decimate { vertices: n_source.max(n_target) };
+        let reserved = memory::reserve("the search for nearest neighbours", needed, remedy)?;
         let start =
             self.timed("point map", || self.start(own, &maps, solver.comparison(), &bases, landmarks))?;
         let found = self.refine(refinement, &start)?;
         let judge = self.timed("quality", || self.judge())?;
-        let tried = self.with_candidates(&judge, &start, found, landmarks)?;
-        let Tried { found, quality, estimate, candidates, resized } = tried;
+        let mut tried = self.with_candidates(&judge, &start, found, landmarks)?;
         drop(reserved);
-        self.say_what_looks_wrong(&quality, &estimate);
-        let doubt = match &resized {
-            Some(source) => self.with_source(source).judge()?.doubt(&found),
-            None => judge.doubt(&found),
+        let resized = tried.resized.take();
+        let resized = resized.as_deref().map(|source| self.with_source(source));
+        let judge = match &resized {
+            Some(pair) => pair.judge()?,
+            None => judge,
         };
+        let is_torn_off = !judge.displaced_regions(&tried.found).is_empty();
+        if is_torn_off {
+            tried.doubt();
+        }
+        let doubt = judge.doubt(&tried.found);
+        let Tried { found, quality, estimate, candidates, .. } = tried;
+        self.say_what_looks_wrong(&quality, &estimate, is_torn_off);
         let (mut map, upscale_info) = self.on_inputs(&found, &doubt)?;
         if let Some(landmarks) = landmarks {
             landmarks.keep(&mut map, &self.target.shape);

@@ -54,7 +54,10 @@ impl Pair<'_> {
     }
 
     /// The map by the first way, refined.
-    fn first_map(&self, landmarks: Option<&Landmarks>) -> Result<(Found, (Quality, Estimate)), Error> {
+    pub(super) fn first_map(
+        &self,
+        landmarks: Option<&Landmarks>,
+    ) -> Result<(Found, (Quality, Estimate)), Error> {
         let landmarks = landmarks.map(|landmarks| landmarks.of(self)).transpose()?;
         let own = [&self.source.descriptors, &self.target.descriptors];
         let start = self.solved(own, self.matcher.k, 1.0, landmarks.as_ref())?;

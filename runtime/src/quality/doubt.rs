@@ -33,7 +33,7 @@ pub fn doubt(map: &PointMap, back: Option<&PointMap>, source: Side, target: Side
 }
 
 /// Of each vertex, the share of the triangles around it that the map reverses.
-fn reversed_share(map: &PointMap, source: Side, target: Side) -> Vec<f64> {
+pub(super) fn reversed_share(map: &PointMap, source: Side, target: Side) -> Vec<f64> {
     let mut sums = vec![[0.0; 2]; map.len()];
     for (face, corners) in source.mesh.faces().iter().enumerate() {
         if let Some(keeps) = keeps_orientation(map, face, source, target) {
@@ -71,7 +71,7 @@ fn ratios(sums: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Averages a function over neighbours, weighted by their areas, [`STEPS`] times.
-fn averaged(values: &[f64], source: Side) -> Vec<f64> {
+pub(super) fn averaged(values: &[f64], source: Side) -> Vec<f64> {
     let (stiffness, mass) = (&source.laplacian.stiffness, &source.basis.mass);
     let mut values = values.to_vec();
     for _ in 0..STEPS {

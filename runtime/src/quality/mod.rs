@@ -7,6 +7,7 @@
 
 mod doubt;
 mod estimate;
+mod regions;
 mod spectral;
 mod surface;
 
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use doubt::doubt;
 pub use estimate::{Calibration, Estimate};
+pub use regions::displaced_regions;
 pub use surface::SurfaceFrame;
 
 /// Eigenfunctions of the spectral measures: more of them see noise that does not matter.

@@ -116,3 +116,50 @@ fn parts_have_a_calibration_of_their_own() {
     assert!(bad.iter().all(|estimate| estimate.doubtful && estimate.expected_error > 10.0));
     assert!(good.iter().all(|estimate| !estimate.doubtful && estimate.expected_error < 9.0));
 }
+
+/// Two arms of a cross exchange places: each is a region elsewhere. Stretched or reversed places alone are none.
+#[test]
+fn exchanged_limbs_are_displaced_regions() {
+    let source = Measured::new(limbs());
+    let n = source.mesh.n_vertices();
+    let regions = |map: &PointMap| displaced_regions(map, source.side(), source.side());
+    assert!(regions(&identity(n)).is_empty());
+    let at = |v: usize| source.mesh.vertices()[v];
+    let arm = |side: f64| move |v: &usize| side * at(*v)[0] > 1.0;
+    let mut map = identity(n);
+    for v in (0..n).filter(|v| arm(1.0)(v) || arm(-1.0)(v)) {
+        let [x, y, z] = at(v);
+        // Turned half round the vertical axis, so that the orientation stays.
+        let wanted = [-x, y, -z];
+        let nearest = crate::mesh::nearest_vertices(source.mesh.vertices(), &[wanted]);
+        map.targets[v] = nearest[0];
+    }
+    let found = regions(&map);
+    assert_eq!(found.len(), 2, "{:?}", found.iter().map(Vec::len).collect::<Vec<_>>());
+    for region in &found {
+        let right = region.iter().filter(|&&v| at(v as usize)[0].abs() > 1.0).count();
+        assert!(right as f64 > 0.9 * region.len() as f64, "{right} of {}", region.len());
+    }
+    // All of it turned inside out is one region.
+    let mirrored = |v: usize| {
+        let [x, y, z] = at(v);
+        crate::mesh::nearest_vertices(source.mesh.vertices(), &[[-x, y, z]])[0]
+    };
+    let mirrored = PointMap::new((0..n).map(mirrored).collect(), n);
+    let found = regions(&mirrored);
+    assert!(found.len() == 1 && found[0].len() > n * 9 / 10);
+}
+
+/// A ball with arms along the first axis and a longer one along the second, exactly symmetric.
+fn limbs() -> Mesh {
+    let ball = crate::mesh::shapes::icosphere(4);
+    let reach = |[x, y, z]: [f64; 3]| {
+        let along = |c: f64, others: f64, length: f64| {
+            if c > 0.0 { 1.0 + length * (-others / 0.1).exp() } else { 1.0 }
+        };
+        let factor = along(x.abs(), y * y + z * z, 2.0) * along(y, x * x + z * z, 3.0);
+        [x, y, z].map(|c| factor * c)
+    };
+    let vertices = ball.vertices().iter().map(|&p| reach(p)).collect();
+    Mesh::new(vertices, ball.faces().to_vec()).unwrap()
+}
