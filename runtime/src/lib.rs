@@ -47,7 +47,7 @@
 //! | use | [`render`] | attribute transfer, coloured pairs, an HTML viewer |
 //!
 //! [`pipeline`] knows their order, [`batch`] the files of many pairs, [`shape`] what is computed of one shape; [`cache`] keeps it in a folder, [`memory`] refuses what
-//! would not fit, [`events`] tell how far it is.
+//! would not fit, [`events`] tell how far it is. Programs that match large meshes may install [`LargePages`].
 //!
 //! # Conventions
 //!
@@ -80,6 +80,7 @@ pub mod events;
 pub mod fmap;
 pub mod geodesic;
 pub mod io;
+mod large_pages;
 mod matrix;
 pub mod memory;
 pub mod mesh;
@@ -98,5 +99,6 @@ pub mod spectral;
 pub mod upscale;
 
 pub use error::{Error, causes};
+pub use large_pages::LargePages;
 pub use matrix::Matrix;
 pub use mesh::Mesh;

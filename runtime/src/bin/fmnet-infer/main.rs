@@ -10,6 +10,9 @@ use clap::Parser;
 use console::Console;
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: fmnet::LargePages = fmnet::LargePages;
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let console = Console::new(&cli.common);

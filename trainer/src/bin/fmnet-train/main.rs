@@ -19,6 +19,9 @@ use fmnet_trainer::synth::SynthError;
 use fmnet_trainer::train::TrainError;
 use std::process::ExitCode;
 
+#[global_allocator]
+static ALLOCATOR: fmnet::LargePages = fmnet::LargePages;
+
 fn main() -> ExitCode {
     let command = args::with_defaults(Cli::command());
     let cli = match Cli::from_arg_matches(&command.get_matches()) {
