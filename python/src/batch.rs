@@ -33,7 +33,9 @@ pub(crate) fn read_pairs(
     format: &str,
 ) -> PyResult<Vec<(PathBuf, PathBuf, PathBuf)>> {
     if !["txt", "vts", "npy", "csv", "npz"].contains(&format) {
-        return Err(wrong(format!("format is {format:?}, expected \"txt\", \"vts\", \"npy\", \"csv\" or \"npz\"")));
+        return Err(wrong(format!(
+            "format is {format:?}, expected \"txt\", \"vts\", \"npy\", \"csv\" or \"npz\""
+        )));
     }
     let pairs = read(&pairs, root.as_deref(), &out, format).map_err(|error| match error {
         PairsError::Io(error) => Failure::from(error).into(),

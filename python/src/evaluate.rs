@@ -47,8 +47,11 @@ pub(crate) fn geodesic_distances<'py>(
         let sources: Vec<u32> = sources
             .map_err(|v| said(format!("sources: there is no vertex {v}; the mesh has {n} (0-based)")))?;
         let needed = 4 * n as u64 * sources.len() as u64;
-        let _reserved =
-            memory::reserve("the distances", needed, Remedy::Other("ask for those from fewer sources at a time"))?;
+        let _reserved = memory::reserve(
+            "the distances",
+            needed,
+            Remedy::Other("ask for those from fewer sources at a time"),
+        )?;
         Ok(GeodesicSolver::new(&mesh, &GeodesicOptions::default()).from_sources(&sources))
     })?;
     let n = distances.cols();

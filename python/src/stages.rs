@@ -42,8 +42,11 @@ pub(crate) fn eigenbasis<'py>(
     let basis = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
         let needed = memory::eigenbasis_bytes(mesh.n_vertices(), k);
-        let _reserved =
-            memory::reserve("the eigenbasis", needed, Remedy::Other("ask for fewer pairs, or decimate the mesh"))?;
+        let _reserved = memory::reserve(
+            "the eigenbasis",
+            needed,
+            Remedy::Other("ask for fewer pairs, or decimate the mesh"),
+        )?;
         let (basis, info) = compute_eigenbasis(&Laplacian::new(&mesh), k, &EigenOptions::default())?;
         if info.complete == Some(false) {
             let text = format!(
@@ -86,8 +89,11 @@ pub(crate) fn shot<'py>(
     (options.radius, options.bins, options.min_neighbors) = (radius, bins, min_neighbors);
     let descriptors = run(py, None, move |observer| {
         let mesh = input.load_mesh("mesh", observer)?;
-        let _reserved =
-            memory::reserve("SHOT", memory::descriptor_bytes(mesh.n_vertices(), 0), Remedy::Other("decimate the mesh"))?;
+        let _reserved = memory::reserve(
+            "SHOT",
+            memory::descriptor_bytes(mesh.n_vertices(), 0),
+            Remedy::Other("decimate the mesh"),
+        )?;
         Ok(compute_shot(&mesh, &options)?.0)
     })?;
     Ok(out_matrix(py, descriptors)?.into_any())

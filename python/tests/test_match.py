@@ -26,6 +26,29 @@ def test_a_map_of_files_has_the_bytes_of_the_program(demo, program, tmp_path):
     np.testing.assert_array_equal(match.targets, np.load(tmp_path / "p.npy"))
 
 
+def test_vertices_that_repair_left_out_are_marked_and_an_npz_map_is_read_back(program, tmp_path):
+    vertices, faces = sphere()
+    crumb, crumb_faces = sphere(1)
+    all_vertices = np.concatenate([vertices, 0.01 * crumb + vertices[7]])
+    match = fmnet.match((all_vertices, np.concatenate([faces, crumb_faces + len(vertices)])), (vertices, faces), **SHOT)
+    np.testing.assert_array_equal(match.followers, np.arange(len(vertices), len(all_vertices)))
+    assert match.followers.dtype == np.int32 and (match.targets >= 0).all()
+    assert len(fmnet.match((vertices, faces), (vertices, faces), **SHOT).followers) == 0
+    match.save(tmp_path / "map.npz")
+    with np.load(tmp_path / "map.npz") as saved:
+        np.testing.assert_array_equal(saved["followers"], match.followers)
+        np.savez_compressed(tmp_path / "packed.npz", **saved)
+    for name, (points, triangles) in {"a": (all_vertices, np.concatenate([faces, crumb_faces + len(vertices)])),
+                                      "b": (vertices, faces)}.items():  # fmt: skip
+        lines = ["v {} {} {}".format(*p) for p in points] + ["f {} {} {}".format(*t) for t in triangles + 1]
+        (tmp_path / f"{name}.obj").write_text("\n".join(lines) + "\n")
+    np.save(tmp_path / "values.npy", np.arange(len(vertices)))
+    for stem in ["map", "packed"]:
+        program("transfer", tmp_path / "a.obj", tmp_path / "b.obj", "--map", tmp_path / f"{stem}.npz",
+                "--values", tmp_path / "values.npy", "-o", tmp_path / f"{stem}.npy")  # fmt: skip
+    np.testing.assert_array_equal(np.load(tmp_path / "map.npy"), np.load(tmp_path / "packed.npy"))
+
+
 @pytest.mark.parametrize(
     "options",
     [

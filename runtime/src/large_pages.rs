@@ -68,7 +68,7 @@ mod tests {
             // SAFETY: the layouts are those that the blocks were taken with, and only their bytes are touched.
             unsafe {
                 let block = LargePages.alloc_zeroed(layout);
-                assert!(!block.is_null() && block as usize % 64 == 0);
+                assert!(!block.is_null() && (block as usize).is_multiple_of(64));
                 let bytes = std::slice::from_raw_parts_mut(block, size);
                 assert!(bytes.iter().all(|&b| b == 0));
                 bytes.fill(7);
