@@ -30,7 +30,9 @@ def test_vertices_that_repair_left_out_are_marked_and_an_npz_map_is_read_back(pr
     vertices, faces = sphere()
     crumb, crumb_faces = sphere(1)
     all_vertices = np.concatenate([vertices, 0.01 * crumb + vertices[7]])
-    match = fmnet.match((all_vertices, np.concatenate([faces, crumb_faces + len(vertices)])), (vertices, faces), **SHOT)
+    joined = np.concatenate([faces, crumb_faces + len(vertices)])
+    with pytest.warns(fmnet.FmnetWarning, match="42 of 684 vertices.* follow"):
+        match = fmnet.match((all_vertices, joined), (vertices, faces), **SHOT)
     np.testing.assert_array_equal(match.followers, np.arange(len(vertices), len(all_vertices)))
     assert match.followers.dtype == np.int32 and (match.targets >= 0).all()
     assert len(fmnet.match((vertices, faces), (vertices, faces), **SHOT).followers) == 0
@@ -38,8 +40,7 @@ def test_vertices_that_repair_left_out_are_marked_and_an_npz_map_is_read_back(pr
     with np.load(tmp_path / "map.npz") as saved:
         np.testing.assert_array_equal(saved["followers"], match.followers)
         np.savez_compressed(tmp_path / "packed.npz", **saved)
-    for name, (points, triangles) in {"a": (all_vertices, np.concatenate([faces, crumb_faces + len(vertices)])),
-                                      "b": (vertices, faces)}.items():  # fmt: skip
+    for name, (points, triangles) in {"a": (all_vertices, joined), "b": (vertices, faces)}.items():
         lines = ["v {} {} {}".format(*p) for p in points] + ["f {} {} {}".format(*t) for t in triangles + 1]
         (tmp_path / f"{name}.obj").write_text("\n".join(lines) + "\n")
     np.save(tmp_path / "values.npy", np.arange(len(vertices)))

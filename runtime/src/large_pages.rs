@@ -7,6 +7,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 
 /// A large page, in bytes.
+#[cfg_attr(not(target_os = "linux"), allow(dead_code))]
 const PAGE: usize = 2 << 20;
 
 /// The system's allocator, which asks for large pages for what is large enough.

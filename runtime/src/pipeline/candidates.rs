@@ -126,7 +126,9 @@ impl Pair<'_> {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             self.attempt("without descriptors beside", &start, judge, &mut tried)?;
         }
-        let is_torn = more && self.try_other_side(judge, &mut tried, landmarks)?;
+        // Regions of a part hang together by bridges between its holes, which tear where nothing is wrong.
+        let suspicious = !self.is_part() || tried.estimate.doubtful;
+        let is_torn = more && suspicious && self.try_other_side(judge, &mut tried, landmarks)?;
         let asked_to_adapt = self.matcher.adapt.is_some_and(|steps| steps > 0);
         if all || is_torn || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;

@@ -64,7 +64,7 @@ impl Pair<'_> {
             Some(pair) => pair.judge()?,
             None => judge,
         };
-        let is_torn_off = !judge.displaced_regions(&tried.found).is_empty();
+        let is_torn_off = !self.is_part() && !judge.displaced_regions(&tried.found).is_empty();
         if is_torn_off {
             tried.doubt();
         }
