@@ -15,6 +15,10 @@ const PAGE: usize = 2 << 20;
 /// ```
 /// #[global_allocator]
 /// static ALLOCATOR: fmnet::LargePages = fmnet::LargePages;
+///
+/// fn main() {
+///     assert_eq!(vec![7u8; 3 << 20].iter().filter(|&&b| b == 7).count(), 3 << 20);
+/// }
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LargePages;
