@@ -5,7 +5,6 @@
 //! them with what was measured. On Linux the memory available is the least of what the machine, the control group and the
 //! limit of the address space leave, in WebAssembly what 32-bit addresses do; elsewhere it is not known and nothing is refused.
 
-use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
 
@@ -46,7 +45,7 @@ const FEWEST: usize = 500;
 
 impl Remedy {
     /// The advice where `share` of the memory is there.
-    fn at(&self, share: f64) -> impl fmt::Display {
+    fn at(&self, share: f64) -> String {
         match self {
             Self::Other(text) => (*text).to_string(),
             // A tenth less than what would just fit, in two digits.

@@ -47,18 +47,15 @@ fn of_model(
     let model = matcher.network().and_then(|network| network.native());
     let model = model.ok_or_else(|| TrainError::NoDiffusionNet { path: path.to_path_buf() })?;
     // The scale of SHOT is in the file's weights, whatever it was.
-    let shot_scale = match &config.network {
-        NetworkOptions::Diffusion(options) if options.takes_shot() && model.takes_shot() => {
-            options.shot_scale
-        }
-        _ => f64::from(u8::from(model.takes_shot())),
+    let scale = match &config.network {
+        NetworkOptions::Diffusion(options) if options.takes_shot() => options.shot_scale,
+        _ => 1.0,
     };
-    let options = options_of(model, shot_scale);
+    let options = options_of(model, if model.takes_shot() { scale } else { 0.0 });
     let mut weights = model.parameters().to_vec();
-    if model.takes_shot() {
-        let of_shot = options.wks_energies * options.width..options.inputs() * options.width;
-        weights[of_shot].iter_mut().for_each(|weight| *weight /= shot_scale as f32);
-    }
+    // Empty where it takes no SHOT.
+    let of_shot = options.wks_energies * options.width..options.inputs() * options.width;
+    weights[of_shot].iter_mut().for_each(|weight| *weight /= scale as f32);
     let found = NetworkOptions::Diffusion(options);
     check(path, &found, &config.network)?;
     let network = found.build(config.seed, device)?;

@@ -87,15 +87,6 @@ impl Tried {
         better
     }
 
-    /// Calls the map taken doubtful.
-    pub(super) fn doubt(&mut self) {
-        self.estimate.doubtful = true;
-        self.candidates
-            .iter_mut()
-            .filter(|candidate| candidate.taken)
-            .for_each(|c| c.estimate.doubtful = true);
-    }
-
     /// Calls the map taken doubtful from half the usual probability on, where it is not the first: the best of several looks better than it
     /// is.
     fn doubt_the_best(&mut self, usual: f64) {
@@ -126,11 +117,11 @@ impl Pair<'_> {
             let start = Start { anchors: self.anchors(None, landmarks), ..start.clone() };
             self.attempt("without descriptors beside", &start, judge, &mut tried)?;
         }
-        // Regions of a part hang together by bridges between its holes, which tear where nothing is wrong.
-        let suspicious = !self.is_part() || tried.estimate.doubtful;
-        let is_torn = more && suspicious && self.try_other_side(judge, &mut tried, landmarks)?;
+        if more && tried.estimate.doubtful {
+            self.try_other_side(judge, &mut tried, landmarks)?;
+        }
         let asked_to_adapt = self.matcher.adapt.is_some_and(|steps| steps > 0);
-        if all || is_torn || more && tried.estimate.doubtful {
+        if all || more && tried.estimate.doubtful {
             self.try_others(judge, start, &mut tried, landmarks)?;
         } else if asked_to_adapt && !self.is_part() {
             self.try_adapted(judge, &mut tried, landmarks)?;
@@ -198,6 +189,12 @@ impl Pair<'_> {
         let [phi, psi] = self.bases(self.matcher.k)?;
         let functional_map = crate::fmap::functional_map_of(&map, &phi, &psi)?;
         Ok(Start { functional_map, map, back, embedding: Some(embedding), anchors: None })
+    }
+
+    /// The map by the first way, refined.
+    pub(super) fn by_first_way(&self, landmarks: Option<&Landmarks>) -> Result<Found, Error> {
+        let own = [&self.source.descriptors, &self.target.descriptors];
+        self.refine(Refinement::Wavelet, &self.solved(own, self.matcher.k, 1.0, landmarks)?)
     }
 
     /// The functional maps of descriptors at another `k` or so many times the usual weight of the mask.

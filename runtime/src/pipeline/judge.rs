@@ -31,7 +31,15 @@ impl Judge<'_> {
     pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
         let [source, target] = self.sides();
         let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
-        Ok((quality, self.pair.matcher.calibration(self.pair.is_part()).estimate(&quality)))
+        let mut estimate = self.pair.matcher.calibration(self.pair.is_part()).estimate(&quality);
+        estimate.doubtful |= self.is_torn_apart(found);
+        Ok((quality, estimate))
+    }
+
+    /// Whether a map of wholes sends a region elsewhere. Regions of a part hang together by bridges between its holes, which tear where
+    /// nothing is wrong.
+    fn is_torn_apart(&self, found: &Found) -> bool {
+        !self.pair.is_part() && !self.displaced_regions(found).is_empty()
     }
 
     pub(super) fn doubt(&self, found: &Found) -> Vec<f32> {
@@ -43,6 +51,34 @@ impl Judge<'_> {
     pub(super) fn displaced_regions(&self, found: &Found) -> Vec<Vec<u32>> {
         let [source, target] = self.sides();
         displaced_regions(&found.map, source, target)
+    }
+
+    /// What looks most wrong with a map, in words.
+    fn complaint(&self, found: &Found, quality: &Quality) -> &'static str {
+        match self.is_torn_apart(found) {
+            true => "parts of it are torn off, as where limbs are exchanged",
+            false => quality.complaint(),
+        }
+    }
+
+    pub(super) fn say_what_looks_wrong(&self, found: &Found, quality: &Quality, estimate: &Estimate) {
+        let pair = self.pair;
+        if quality.is_mirrored() {
+            pair.warn(&format!(
+                "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
+                100.0 * quality.reversed
+            ));
+        } else if estimate.doubtful {
+            let remedy = match pair.is_part() {
+                true => "a larger part, one in the whole's unit and of a body of its size, or --landmarks",
+                false => "--effort high, --landmarks or --adapt",
+            };
+            pair.warn(&format!(
+                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
+                estimate.expected_error,
+                self.complaint(found, quality)
+            ));
+        }
     }
 }
 
@@ -58,24 +94,5 @@ impl Pair<'_> {
             laplacians: [source.0, target.0],
             frames: [source.1, target.1],
         })
-    }
-
-    pub(super) fn say_what_looks_wrong(&self, quality: &Quality, estimate: &Estimate, is_torn_off: bool) {
-        if quality.is_mirrored() {
-            self.warn(&format!(
-                "the map turns {:.0} % of the surface inside out: one of the meshes is mirrored or has its faces turned round, or left and right are exchanged; check the orientation of both",
-                100.0 * quality.reversed
-            ));
-        } else if estimate.doubtful {
-            let remedy = match self.is_part() {
-                true => "a larger part, one in the whole's unit and of a body of its size, or --landmarks",
-                false => "--effort high, --landmarks or --adapt",
-            };
-            self.warn(&format!(
-                "the map is doubtful (expected mean error {:.0} % of sqrt(area)): {}; look at it (-o map.html) and try {remedy}",
-                estimate.expected_error,
-                if is_torn_off { "parts of it are torn off, as where limbs are exchanged" } else { quality.complaint() }
-            ));
-        }
     }
 }

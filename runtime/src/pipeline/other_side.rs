@@ -15,17 +15,16 @@ use crate::point_map::PointMap;
 use crate::shape::Context;
 
 impl Pair<'_> {
-    /// Tries the map with all displaced regions on the other side, then with each of several alone. Whether the map that is taken still
-    /// has such regions.
+    /// Tries the map with all displaced regions, if it has any, on the other side, then with each of several alone.
     pub(super) fn try_other_side(
         &self,
         judge: &Judge,
         tried: &mut Tried,
         landmarks: Option<&Landmarks>,
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
         let regions = judge.displaced_regions(&tried.found);
         if regions.is_empty() {
-            return Ok(false);
+            return Ok(());
         }
         let other_side = self.timed("mirror image", || self.other_side_of_target())?;
         let first = (tried.found.map.clone(), tried.found.back.clone());
@@ -40,7 +39,7 @@ impl Pair<'_> {
                 attempt(&format!("torn region {} on the other side", i + 1), region)?;
             }
         }
-        Ok(!judge.displaced_regions(&tried.found).is_empty())
+        Ok(())
     }
 
     /// The start from a map and the one back with a region on the other side; descriptors beside it tell front from back there.
@@ -66,7 +65,7 @@ impl Pair<'_> {
         let descriptors = self.matcher.descriptor().describe(&shape, context)?;
         let mirrored = DescribedShape { shape, descriptors, described_by: self.target.described_by };
         let pair = Pair { source: self.target, target: &mirrored, context, ..self.with_source(self.target) };
-        Ok(pair.first_map(None)?.0.map)
+        Ok(pair.by_first_way(None)?.map)
     }
 }
 

@@ -56,21 +56,14 @@ impl Pair<'_> {
             self.timed("point map", || self.start(own, &maps, solver.comparison(), &bases, landmarks))?;
         let found = self.refine(refinement, &start)?;
         let judge = self.timed("quality", || self.judge())?;
-        let mut tried = self.with_candidates(&judge, &start, found, landmarks)?;
+        let tried = self.with_candidates(&judge, &start, found, landmarks)?;
+        let Tried { found, quality, estimate, candidates, resized } = tried;
         drop(reserved);
-        let resized = tried.resized.take();
-        let resized = resized.as_deref().map(|source| self.with_source(source));
-        let judge = match &resized {
-            Some(pair) => pair.judge()?,
-            None => judge,
+        judge.say_what_looks_wrong(&found, &quality, &estimate);
+        let doubt = match &resized {
+            Some(source) => self.with_source(source).judge()?.doubt(&found),
+            None => judge.doubt(&found),
         };
-        let is_torn_off = !self.is_part() && !judge.displaced_regions(&tried.found).is_empty();
-        if is_torn_off {
-            tried.doubt();
-        }
-        let doubt = judge.doubt(&tried.found);
-        let Tried { found, quality, estimate, candidates, .. } = tried;
-        self.say_what_looks_wrong(&quality, &estimate, is_torn_off);
         let (mut map, upscale_info) = self.on_inputs(&found, &doubt)?;
         if let Some(landmarks) = landmarks {
             landmarks.keep(&mut map, &self.target.shape);

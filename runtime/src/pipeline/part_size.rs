@@ -1,11 +1,11 @@
 //! Other sizes of a part, tried where its map is doubtful: parts of one shape are often matched to the whole of a larger or smaller one,
 //! or come in another unit of length.
 
+use super::DescribedShape;
 use super::candidates::Tried;
 use super::landmarks::Landmarks;
 use super::pair::{LARGEST_SHARE, Pair};
 use super::refine::Found;
-use super::{DescribedShape, Refinement};
 use crate::error::Error;
 use crate::quality::{Estimate, Quality};
 use crate::shape::Context;
@@ -53,15 +53,9 @@ impl Pair<'_> {
         Ok(())
     }
 
-    /// The map by the first way, refined.
-    pub(super) fn first_map(
-        &self,
-        landmarks: Option<&Landmarks>,
-    ) -> Result<(Found, (Quality, Estimate)), Error> {
+    fn first_map(&self, landmarks: Option<&Landmarks>) -> Result<(Found, (Quality, Estimate)), Error> {
         let landmarks = landmarks.map(|landmarks| landmarks.of(self)).transpose()?;
-        let own = [&self.source.descriptors, &self.target.descriptors];
-        let start = self.solved(own, self.matcher.k, 1.0, landmarks.as_ref())?;
-        let found = self.refine(Refinement::Wavelet, &start)?;
+        let found = self.by_first_way(landmarks.as_ref())?;
         let judged = self.judge()?.judge(&found)?;
         Ok((found, judged))
     }

@@ -24,7 +24,8 @@ pub struct Estimate {
     pub expected_error: f64,
     /// The probability that the mean error is above 10.
     pub bad: f64,
-    /// Whether that is so probable that the map should not be used without a look.
+    /// Whether that is so probable that the map should not be used without a look; of a pair also where it has
+    /// [displaced regions](super::displaced_regions).
     pub doubtful: bool,
 }
 

@@ -25,7 +25,7 @@ use thiserror::Error;
 pub use pairs::{PairError, listed_pairs, random_pairs};
 
 /// Formats of map files, in the order in which they are looked for.
-const MAP_EXTENSIONS: [&str; 4] = ["txt", "vts", "npy", "csv"];
+const MAP_EXTENSIONS: [&str; 5] = ["txt", "vts", "npy", "csv", "npz"];
 
 /// Something that gives a map for every pair.
 #[derive(Clone, Debug, PartialEq)]

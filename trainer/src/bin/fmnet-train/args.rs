@@ -261,7 +261,7 @@ pub(crate) struct EvaluateArgs {
     /// Compare SHOT without a network as well
     #[arg(long)]
     pub(crate) shot: bool,
-    /// Compare the map files of another method as well: its name and the folder of SOURCE__TARGET.txt (.vts, .npy,
+    /// Compare the map files of another method as well: its name and the folder of SOURCE__TARGET.txt (.vts, .npy, .npz,
     /// .csv); may be given several times
     #[arg(long = "maps", value_name = "NAME=DIR", value_parser = named_folder)]
     pub(crate) maps: Vec<(String, PathBuf)>,
