@@ -9,8 +9,8 @@ import sys
 import common
 import numpy as np
 
-#: Difference relative to the largest output that counts as agreement.
-TOLERANCE = 1e-4
+#: Difference relative to the largest output that counts as agreement; tract, in single precision, comes to 1e-4 at 15000 vertices.
+TOLERANCE = 2e-4
 #: The built-in model, as the bench loads it.
 MODEL = pathlib.Path(__file__).resolve().parents[2] / "model.onnx"
 #: What computed the outputs in the bench.

@@ -13,9 +13,9 @@ const LEAST: f64 = 0.03;
 const REVERSED: f64 = 0.5;
 /// A tear is of edges that become so many times longer: where it crosses a limb refinement has smoothed it over a few edges.
 const CUT: f64 = 2.5;
-/// Across the border of a region that is elsewhere a quarter of the edges tear and become so long, relative to sqrt(area): 0.10 to 0.30
-/// at exchanged limbs, up to 0.05 at regions of good maps.
-const JUMP: f64 = 0.08;
+/// At a quarter of the edges on the border of a region that is elsewhere the surface tears so far apart, relative to sqrt(area): 0.15
+/// to 0.35 at exchanged limbs, up to 0.11 at regions of good maps.
+const JUMP: f64 = 0.12;
 
 /// The regions of the source that the map has torn off from the rest and sent elsewhere, the largest first: the vertices of each,
 /// ascending. A region is connected, has 3 % of the area or more and the same orientation on the target throughout. The largest
@@ -28,25 +28,30 @@ pub fn displaced_regions(map: &PointMap, source: Side, target: Side) -> Vec<Vec<
     let is_reversed = |v: u32| reversed[v as usize] > REVERSED;
     let mut sets = UnionFind::new(map.len());
     let mut border = Vec::new();
+    // Where a limb is reversed its border is an edge or two beside the tear; so a border edge has the longest tear next to it.
+    let mut tear = vec![0.0f64; map.len()];
     for &edge in &source.frame.edges {
         let Some(stretch) = stretch(map, edge, source, target) else { continue };
         let [a, b] = edge;
         if stretch < CUT && is_reversed(a) == is_reversed(b) {
             sets.union(a, b);
         } else {
+            border.push(edge);
+        }
+        // What is stretched without a tear may be a short tail on a long one.
+        if stretch > TORN {
             let [from, to] = edge.map(|v| source.mesh.vertices()[v as usize]);
-            // What is stretched without a tear may be a short tail on a long one.
-            let jump =
-                if stretch > TORN { stretch * vec3::distance(from, to) / source.frame.unit } else { 0.0 };
-            border.push((edge, jump));
+            let length = stretch * vec3::distance(from, to) / source.frame.unit;
+            edge.iter().for_each(|&v| tear[v as usize] = tear[v as usize].max(length));
         }
     }
     let roots: Vec<u32> = (0..map.len() as u32).map(|v| sets.find(v)).collect();
     let regions = by_area(&roots, source);
     let is_elsewhere = |region: &[u32]| {
         let own = |v: u32| roots[v as usize] == roots[region[0] as usize];
+        let at_border = border.iter().filter(|[a, b]| own(*a) != own(*b));
         let mut jumps: Vec<f64> =
-            border.iter().filter(|([a, b], _)| own(*a) != own(*b)).map(|(_, jump)| *jump).collect();
+            at_border.map(|edge| edge.map(|v| tear[v as usize])).map(|[a, b]| a.max(b)).collect();
         jumps.sort_by(f64::total_cmp);
         jumps.get(jumps.len() * 3 / 4).is_some_and(|&jump| jump > JUMP)
     };

@@ -23,6 +23,7 @@ pub(crate) fn run(args: &ExportArgs, common: &Common) -> Result<()> {
         calibration: args.calibration.as_deref().map(read_calibration).transpose()?,
     };
     let mut metadata = metadata(&checkpoint, &origin);
+    metadata.k = args.k.map_or(metadata.k, usize::from);
     match args.decimate {
         Some(n @ 1..100) => bail!("--decimate is {n}, but must be 100 or more, or 0 (never)"),
         Some(n) => metadata.decimate = Some(n).filter(|&n| n > 0),
