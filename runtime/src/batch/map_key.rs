@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Raised with every change by which the same meshes, model and options give another map within a version of the library.
-const REVISION: u8 = 4;
+const REVISION: u8 = 5;
 
 /// Keys of maps: hashes of both meshes, the model, every option and the version of the library.
 #[derive(Clone, Debug)]
