@@ -1,4 +1,5 @@
-//! Maps say what they are worth: by exit status, summary and warning, on the demo's bodies and copies of them.
+//! Maps say what they are worth: by exit status, summary and warning, on the demo's bodies and copies of them; by the doubt of their
+//! vertices, on people of the research data, where that is at hand.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use fmnet::Mesh;
@@ -107,10 +108,9 @@ impl Person {
         let laplacian = Laplacian::new(&mesh);
         let basis = eigenbasis(&laplacian, 30, &EigenOptions::default()).unwrap().0.at_unit_area(30);
         let frame = SurfaceFrame::new(&mesh);
-        let vertices = |ending: &str| -> Vec<u32> {
+        let vertices = |ending: &str| {
             let path = folder.join(format!("corres/tr_reg_{number}.{ending}"));
-            let text = std::fs::read_to_string(path).unwrap();
-            text.split_whitespace().map(|vertex| vertex.parse::<u32>().unwrap() - 1).collect()
+            read_point_map(&path, None).unwrap().targets
         };
         Self { mesh, laplacian, basis, frame, points: vertices("vts"), mirrored: vertices("sym.vts") }
     }
