@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;
+use fmnet::network::{Backend, DescriptorNetwork};
 use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
@@ -78,6 +79,16 @@ fn a_model_file_starts_a_run_as_its_checkpoint_does() {
     let checkpoint = Checkpoint::read(&first.out.join(LAST)).unwrap();
     let network_of = checkpoint.network(&Device::Cpu).unwrap();
     export(network_of.as_ref(), &metadata(&checkpoint, &ModelOrigin::default()), &model).unwrap();
+
+    let other_k = folder.path().join("other_k.onnx");
+    let k_of = |path: &Path| DescriptorNetwork::load(path, Backend::default()).unwrap().metadata().k;
+    let exported = fmnet_tests::train()
+        .arg("export")
+        .args([&first.out, Path::new("-o"), &other_k])
+        .args(["-k", "15", "--quiet"])
+        .status();
+    assert!(exported.unwrap().success());
+    assert_eq!([k_of(&model), k_of(&other_k)], [first.k, 15]);
 
     let started = |initial: &Path, name: &str, network: &DiffusionOptions| TrainConfig {
         initial: initial.to_path_buf(),
