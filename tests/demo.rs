@@ -18,8 +18,8 @@ fn bodies_of_the_demo_are_those_of_the_generator() {
     assert!(total < 150_000, "{total} bytes");
 }
 
-/// Mean geodesic error of the demo, relative to sqrt(area), that the built-in model must not exceed. A model or a default that
-/// does better may lower it.
+/// Mean geodesic error of the demo, relative to sqrt(area), that the built-in model must not exceed. A model or a
+/// default that does better may lower it.
 const MOST: f64 = 0.075;
 
 #[test]

@@ -1,5 +1,5 @@
-//! A DiffusionNet that was trained elsewhere: its descriptors through the kernels, Candle and an exported model file. Needs
-//! the folder `reference` beside the research data.
+//! A DiffusionNet that was trained elsewhere: its descriptors through the kernels, Candle and an exported model file.
+//! Needs the folder `reference` beside the research data.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use candle_core::Device;

@@ -7,7 +7,8 @@ use fmnet::mesh::shapes::{bumpy_sphere, permuted};
 use fmnet_tests::{Workplace, javascript, python, root, run, targets};
 use std::process::Command;
 
-/// How much farther than the program's match another one may be and still count as a tie: descriptors are rounded to f32.
+/// How much farther than the program's match another one may be and still count as a tie: descriptors are rounded to
+/// f32.
 const TIE: f64 = 1e-3;
 
 /// A pair with features, and the program's map and functional maps.

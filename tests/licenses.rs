@@ -1,4 +1,5 @@
-//! Every dependency has a licence that goes with MIT OR Apache-2.0: what `cargo deny check licenses` checks, without it.
+//! Every dependency has a licence that goes with MIT OR Apache-2.0: what `cargo deny check licenses` checks, without
+//! it.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use fmnet_tests::root;

@@ -1,5 +1,5 @@
-//! Maps say what they are worth: by exit status, summary and warning, on the demo's bodies and copies of them; by the doubt of their
-//! vertices, on people of the research data, where that is at hand.
+//! Maps say what they are worth: by exit status, summary and warning, on the demo's bodies and copies of them; by the
+//! doubt of their vertices, on people of the research data, where that is at hand.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 use fmnet::Mesh;
@@ -91,8 +91,8 @@ fn every_candidate_is_listed_and_one_is_taken() {
     assert_eq!(summary["quality"]["expected_error"], taken[0]["expected_error"]);
 }
 
-/// What the measures need of a person, and where the points of the template are: line `i` of the ground truth of each person is the same
-/// point, and its mirror image.
+/// What the measures need of a person, and where the points of the template are: line `i` of the ground truth of each
+/// person is the same point, and its mirror image.
 struct Person {
     mesh: Mesh,
     laplacian: Laplacian,
@@ -150,8 +150,8 @@ fn area_under_curve(values: &[f32], inside: &[bool]) -> f64 {
     pairs / (outside * (values.len() as f64 - outside))
 }
 
-/// Legs of right maps between four pairs of people are sent to the other side: the map is doubtful, and the doubt of the vertices says
-/// which ones were sent.
+/// Legs of right maps between four pairs of people are sent to the other side: the map is doubtful, and the doubt of
+/// the vertices says which ones were sent.
 #[test]
 fn doubt_finds_the_vertices_of_exchanged_legs() {
     let Some(data) = research_data() else { return };

@@ -1,4 +1,5 @@
-//! Errors and warnings as Python knows them: what the system refused is an `OSError`, everything else `fmnet.Error`, a `ValueError`.
+//! Errors and warnings as Python knows them: what the system refused is an `OSError`, everything else `fmnet.Error`,
+//! a `ValueError`.
 
 use fmnet::io::IoError;
 use fmnet::network::NetworkError;
@@ -112,7 +113,8 @@ const ARGUMENTS: [(&str, bool); 9] = [
     ("--partial", false),
 ];
 
-/// A text that names options of the program, with the arguments of functions in their place: `--effort high` becomes `effort="high"`.
+/// A text that names options of the program, with the arguments of functions in their place: `--effort high` becomes
+/// `effort="high"`.
 fn with_arguments(text: &str) -> String {
     // Maps are drawn by other packages here.
     let text = text.replace(" (-o map.html)", "");

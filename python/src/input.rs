@@ -1,4 +1,5 @@
-//! Meshes as people have them: a file, arrays, an object with `.vertices` and `.faces`, or a shape that was described before.
+//! Meshes as people have them: a file, arrays, an object with `.vertices` and `.faces`, or a shape that was described
+//! before.
 
 use crate::arrays::{integers, reals};
 use crate::errors::{Failure, wrong};

@@ -23,8 +23,9 @@ enum Message<T> {
 /// Why the work was left: nobody waits for it any more.
 struct Abandoned;
 
-/// Runs `work` without the interpreter's lock. Warnings become Python warnings, stages go to `progress`. Where Ctrl-C, a warning that is an
-/// error or the callback ends the wait, the work is left at once and ends itself at its next stage.
+/// Runs `work` without the interpreter's lock. Warnings become Python warnings, stages go to `progress`. Where
+/// Ctrl-C, a warning that is an error or the callback ends the wait, the work is left at once and ends itself at its
+/// next stage.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

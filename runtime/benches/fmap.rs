@@ -1,8 +1,8 @@
 //! Milliseconds of the functional map solves, of reading the point map off and of the refinements.
 //!
-//! Two generated people of 6890 vertices, described by the built-in model, 200 eigenfunctions. `cargo bench --workspace --bench
-//! fmap`; options of every bench (`-- --help`); `RAYON_NUM_THREADS` sets the threads. `benches/peers/fmap.py` does the same in NumPy
-//! and pyFM on what `--export` wrote.
+//! Two generated people of 6890 vertices, described by the built-in model, 200 eigenfunctions.
+//! `cargo bench --workspace --bench fmap`; options of every bench (`-- --help`); `RAYON_NUM_THREADS` sets the
+//! threads. `benches/peers/fmap.py` does the same in NumPy and pyFM on what `--export` wrote.
 
 mod support;
 

@@ -1,8 +1,8 @@
 //! Accuracy and time of geodesic distances.
 //!
-//! `cargo bench --workspace --bench geodesic [-- MESH...]`, and the options of every bench (`-- --help`); without meshes, generated
-//! ones and those of the research data that are at hand. Times are for one thread, the least of several runs.
-//! `benches/peers/geodesic.py` times potpourri3d and pygeodesic on what `--export` wrote.
+//! `cargo bench --workspace --bench geodesic [-- MESH...]`, and the options of every bench (`-- --help`); without
+//! meshes, generated ones and those of the research data that are at hand. Times are for one thread, the least of
+//! several runs. `benches/peers/geodesic.py` times potpourri3d and pygeodesic on what `--export` wrote.
 
 mod support;
 

@@ -1,8 +1,8 @@
 //! Seconds of writing, reading, repairing and decimating a mesh: `cargo bench --workspace --bench mesh`.
 //!
-//! Two generated people, from 1K to 1M vertices. Options of every bench (`-- --help`); with `--export` the folder `pair-N` has
-//! `source.ply` and `target.ply` of N vertices, for `fmnet-infer match`. Each figure is the least of several runs. With `--batch`
-//! nothing is measured, and the folder `batch` has shapes for `fmnet-infer batch`.
+//! Two generated people, from 1K to 1M vertices. Options of every bench (`-- --help`); with `--export` the folder
+//! `pair-N` has `source.ply` and `target.ply` of N vertices, for `fmnet-infer match`. Each figure is the least of
+//! several runs. With `--batch` nothing is measured, and the folder `batch` has shapes for `fmnet-infer batch`.
 
 mod support;
 

@@ -1,10 +1,10 @@
 //! Seconds of the exact nearest neighbour search between two spectral embeddings, from 1K to 200K points.
 //!
-//! The embeddings are those of a long rectangle, sampled at random, moved by a functional map with as much
-//! noise as signal. `benches/peers/nearest.py` times a matrix product with the row-wise minimum in NumPy, and SciPy's kd-tree.
+//! The embeddings are those of a long rectangle, sampled at random, moved by a functional map with as much noise as
+//! signal. `benches/peers/nearest.py` times a matrix product with the row-wise minimum in NumPy, and SciPy's kd-tree.
 //!
-//! `cargo bench --workspace --bench nearest -- [n ...]`, and the options of every bench (`-- --help`); `RAYON_NUM_THREADS` sets the
-//! threads.
+//! `cargo bench --workspace --bench nearest -- [n ...]`, and the options of every bench (`-- --help`);
+//! `RAYON_NUM_THREADS` sets the threads.
 
 mod support;
 

@@ -1,8 +1,8 @@
 //! Seconds of the built-in descriptor network: `cargo bench --workspace --bench network`.
 //!
-//! The library's own kernels and tract, on generated people of 2000, 6890 and 15000 vertices, on 1 and 2 threads. Computing the
-//! inputs is not counted. Options of every bench (`-- --help`); `benches/peers/network.py` times onnxruntime on the same file and
-//! the inputs that `--export` wrote. Each figure is the least of several runs.
+//! The library's own kernels and tract, on generated people of 2000, 6890 and 15000 vertices, on 1 and 2 threads.
+//! Computing the inputs is not counted. Options of every bench (`-- --help`); `benches/peers/network.py` times
+//! onnxruntime on the same file and the inputs that `--export` wrote. Each figure is the least of several runs.
 
 mod support;
 

@@ -1,7 +1,8 @@
 //! Time of SHOT over the number of vertices: `cargo bench --workspace --bench shot`.
 //!
-//! Generated shapes, and the meshes with a reference where the data is present, at the radius of the reference. Options of every
-//! bench (`-- --help`); threads: `RAYON_NUM_THREADS`, 1 where it is not set. Each figure is the least of several runs.
+//! Generated shapes, and the meshes with a reference where the data is present, at the radius of the reference.
+//! Options of every bench (`-- --help`); threads: `RAYON_NUM_THREADS`, 1 where it is not set. Each figure is the
+//! least of several runs.
 
 mod support;
 

@@ -1,11 +1,12 @@
 //! Errors, seconds and peak memory of upscaling from 15K vertices, with 30 % of the matches wrong.
 //!
-//! Two poses of one connectivity are subdivided twice and displaced along their normals, so that vertex i corresponds with
-//! vertex i; each is decimated as the pipeline does, and the true map of the decimated meshes, with random targets for 30 % of
-//! its vertices, is upscaled by the l2,1 problem and by least squares. Errors are mean geodesic x 100, relative to sqrt(area).
+//! Two poses of one connectivity are subdivided twice and displaced along their normals, so that vertex i corresponds
+//! with vertex i; each is decimated as the pipeline does, and the true map of the decimated meshes, with random
+//! targets for 30 % of its vertices, is upscaled by the l2,1 problem and by least squares. Errors are mean geodesic x
+//! 100, relative to sqrt(area).
 //!
-//! `cargo bench --workspace --bench upscale -- [SOURCE TARGET] [--subdivisions N] [--vertices N]`: mesh files of one connectivity;
-//! without them a body of the demo and a bent copy of it. Options of every bench: `-- --help`.
+//! `cargo bench --workspace --bench upscale -- [SOURCE TARGET] [--subdivisions N] [--vertices N]`: mesh files of one
+//! connectivity; without them a body of the demo and a bent copy of it. Options of every bench: `-- --help`.
 
 mod support;
 
@@ -124,8 +125,8 @@ fn basis_of(mesh: &Mesh) -> Eigenbasis {
     basis.at_unit_area(K)
 }
 
-/// The decimated source's vertices with the nearest of the decimated target's to their true target, a share of them with
-/// random ones, in the vertices of the full meshes.
+/// The decimated source's vertices with the nearest of the decimated target's to their true target, a share of them
+/// with random ones, in the vertices of the full meshes.
 fn true_matches(
     target: &Mesh,
     work_source: &Decimated,

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! The giver is painted from the front and from behind, with a seam along its sides: the image has two charts. The
-//! program `fmnet-infer` does the same with files: `match RECEIVER GIVER -o map.txt`, then `transfer RECEIVER GIVER --map map.txt`.
+//! program `fmnet-infer` does the same with files: `match RECEIVER GIVER -o map.txt`, then
+//! `transfer RECEIVER GIVER --map map.txt`.
 
 use fmnet::Mesh;
 use fmnet::io::{Attributes, Texture, read_mesh, write_atomically, write_mesh};

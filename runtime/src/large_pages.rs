@@ -1,8 +1,9 @@
 //! An allocator that asks the system for large pages.
 //!
-//! The stages take and give back matrices of some megabytes. Each page of 4 KiB that is touched for the first time costs the kernel about
-//! as long as to fill it; of 2 MiB there are 512 times fewer. Linux gives them to who asks ("transparent huge pages", mode
-//! `madvise`, which most distributions have). A program installs the allocator; the library works with any.
+//! The stages take and give back matrices of some megabytes. Each page of 4 KiB that is touched for the first time
+//! costs the kernel about as long as to fill it; of 2 MiB there are 512 times fewer. Linux gives them to who asks
+//! ("transparent huge pages", mode `madvise`, which most distributions have). A program installs the allocator; the
+//! library works with any.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 
@@ -23,7 +24,8 @@ const PAGE: usize = 2 << 20;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LargePages;
 
-// SAFETY: all memory comes from and goes back to the system's allocator, with the caller's layouts; advice changes no content.
+// SAFETY: all memory comes from and goes back to the system's allocator, with the caller's layouts; advice changes no
+// content.
 unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promises are those of the system's allocator.

@@ -1,9 +1,10 @@
 //! Memory that a stage will take, compared with what there is before it starts.
 //!
-//! A stage that would not fit is refused with its estimate, instead of the machine swapping or the system ending the process.
-//! Estimates are of the stage's peak, from the sizes of what it allocates; the test of this module and `docs/robustness.md` compare
-//! them with what was measured. On Linux the memory available is the least of what the machine, the control group and the
-//! limit of the address space leave, in WebAssembly what 32-bit addresses do; elsewhere it is not known and nothing is refused.
+//! A stage that would not fit is refused with its estimate, instead of the machine swapping or the system ending the
+//! process. Estimates are of the stage's peak, from the sizes of what it allocates; the test of this module and
+//! `docs/robustness.md` compare them with what was measured. On Linux the memory available is the least of what the
+//! machine, the control group and the limit of the address space leave, in WebAssembly what 32-bit addresses do;
+//! elsewhere it is not known and nothing is refused.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
@@ -70,8 +71,8 @@ fn size(bytes: u64) -> String {
     if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.1} GiB", mebibytes / 1024.0) }
 }
 
-/// Bytes of the eigenbasis of `k` pairs of a mesh of `n` vertices: the subspace of about 2.3 k + 128 vectors and its panels, the
-/// basis, the factor.
+/// Bytes of the eigenbasis of `k` pairs of a mesh of `n` vertices: the subspace of about 2.3 k + 128 vectors and its
+/// panels, the basis, the factor.
 pub fn eigenbasis_bytes(n: usize, k: usize) -> u64 {
     let (n, k) = (n as u64, k as u64);
     let subspace = 23 * k / 10 + 128;
@@ -81,14 +82,15 @@ pub fn eigenbasis_bytes(n: usize, k: usize) -> u64 {
     with_margin(vectors + factor)
 }
 
-/// Bytes of a described shape: its basis of `k` pairs, SHOT, `[n, 352]` f32, and the network's activations of that size.
+/// Bytes of a described shape: its basis of `k` pairs, SHOT, `[n, 352]` f32, and the network's activations of that
+/// size.
 pub fn descriptor_bytes(n: usize, k: usize) -> u64 {
     let n = n as u64;
     with_margin(8 * n * k as u64 + 4 * 4 * 352 * n)
 }
 
-/// Bytes of a network on `n` vertices, given the widths of its inputs, all f32: the inputs twice, as the caller's and as the
-/// back-end's, and activations of some 20 times 128 channels.
+/// Bytes of a network on `n` vertices, given the widths of its inputs, all f32: the inputs twice, as the caller's and
+/// as the back-end's, and activations of some 20 times 128 channels.
 pub fn network_bytes(n: usize, input_width: usize) -> u64 {
     with_margin(4 * n as u64 * (2 * input_width as u64 + 20 * 128))
 }
@@ -98,7 +100,8 @@ fn with_margin(bytes: u64) -> u64 {
     bytes + bytes / 8
 }
 
-/// Bytes of a search among `n_target` rows of width `k` by `n_source` rows, all f64: the transported rows, the sorted copy.
+/// Bytes of a search among `n_target` rows of width `k` by `n_source` rows, all f64: the transported rows, the sorted
+/// copy.
 pub fn search_bytes(n_source: usize, n_target: usize, k: usize) -> u64 {
     8 * k as u64 * (2 * n_source as u64 + 2 * n_target as u64)
 }

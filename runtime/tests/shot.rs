@@ -199,8 +199,9 @@ fn agrees_with_the_authors_implementation() {
     }
 }
 
-/// Vertices whose descriptors are kept in `data/shot_bumpy_sphere.npy`: what the present code gives, which agrees with the authors'
-/// implementation where their data is at hand. With `FMNET_WRITE_GOLDEN=1` the test writes the file.
+/// Vertices whose descriptors are kept in `data/shot_bumpy_sphere.npy`: what the present code gives, which agrees
+/// with the authors' implementation where their data is at hand. With `FMNET_WRITE_GOLDEN=1` the test writes the
+/// file.
 const GOLDEN: [usize; 6] = [0, 1, 40, 200, 333, 641];
 
 #[test]

@@ -1,14 +1,16 @@
-//! Hostile files: every reader gets valid files that were changed at random, and must answer with a result or an error: no
-//! panic, no abort, in bounded memory and time.
+//! Hostile files: every reader gets valid files that were changed at random, and must answer with a result or an
+//! error: no panic, no abort, in bounded memory and time.
 //!
-//! Each target runs in a process of its own, so that an abort, a runaway allocation or an endless loop is caught as well; after a
-//! failure it goes on behind the culprit. Inputs are a function of target, seed and number. For a long run:
+//! Each target runs in a process of its own, so that an abort, a runaway allocation or an endless loop is caught as
+//! well; after a failure it goes on behind the culprit. Inputs are a function of target, seed and number. For a long
+//! run:
 //!
 //! ```sh
 //! FMNET_FUZZ_SECONDS=600 FMNET_FUZZ_SEED=2 cargo test --release --workspace --test fuzz -- --nocapture
 //! ```
 //!
-//! `FMNET_FUZZ_TARGET=ply` runs one target only. A failure names the input, which is kept in the folder for temporary files.
+//! `FMNET_FUZZ_TARGET=ply` runs one target only. A failure names the input, which is kept in the folder for temporary
+//! files.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 mod allocator;

@@ -109,8 +109,8 @@ fn start(work: &Workplace, arguments: &[&str]) -> Child {
     command.spawn().unwrap()
 }
 
-/// Interrupts a program once it has said something, which is after it began to listen to interrupts. Its exit status must be that of
-/// an interrupted one.
+/// Interrupts a program once it has said something, which is after it began to listen to interrupts. Its exit status
+/// must be that of an interrupted one.
 fn interrupt_after(mut child: Child, said: &str) {
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
     let heard = lines.find(|line| line.contains(said));
@@ -206,8 +206,8 @@ fn what_does_not_fit_the_memory_is_refused_before_the_work() {
     assert_failed(&output, 1, &["a.ply", "would take about", "GiB", "--decimate"]);
     eprintln!("refused after {:.1} s", start.elapsed().as_secs_f64());
     assert!(!work.path("f/eigenvectors.npy").exists());
-    // The same mesh, decimated, fits. Products pack their panels in buffers of the size of the last-level cache for each
-    // thread, which on large machines takes some hundred MiB of address space.
+    // The same mesh, decimated, fits. Products pack their panels in buffers of the size of the last-level cache for
+    // each thread, which on large machines takes some hundred MiB of address space.
     let limited = [&features[..6], &["--decimate", "3000", "-k", "40", "--threads", "2"]].concat();
     assert!(run_limited(&work, "ulimit -v 4000000", &limited).status.success());
     assert_eq!(read_mesh(&work.path("a.ply")).unwrap().mesh.n_vertices(), 251_001);

@@ -1,4 +1,5 @@
-//! Nothing goes wrong in silence: what a command cannot carry, keep or measure it says, and no output replaces an input.
+//! Nothing goes wrong in silence: what a command cannot carry, keep or measure it says, and no output replaces an
+//! input.
 #![allow(clippy::unwrap_used, reason = "a failing unwrap fails the test")]
 
 mod attributes;

@@ -1,4 +1,5 @@
-//! What several tests need: the Python and JavaScript environments, the real data, small models, a place to run the programs in.
+//! What several tests need: the Python and JavaScript environments, the real data, small models, a place to run the
+//! programs in.
 
 #[path = "../../runtime/tests/support/skipped.rs"]
 mod skip;
@@ -28,15 +29,15 @@ pub fn research_data() -> Option<PathBuf> {
     None
 }
 
-/// A Python interpreter with the pinned packages of `python/requirements.txt`, prepared once; `None`, with a message, where
-/// there is no Python or no package registry.
+/// A Python interpreter with the pinned packages of `python/requirements.txt`, prepared once; `None`, with a message,
+/// where there is no Python or no package registry.
 pub fn python() -> Option<PathBuf> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON.get_or_init(|| prepared("python", &prepare_python)).clone()
 }
 
-/// A folder in which Node.js finds the packages of `javascript/package.json`, prepared once; `None`, with a message, where
-/// there is no Node.js or no package registry.
+/// A folder in which Node.js finds the packages of `javascript/package.json`, prepared once; `None`, with a message,
+/// where there is no Node.js or no package registry.
 pub fn javascript() -> Option<PathBuf> {
     static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
     FOLDER.get_or_init(|| prepared("javascript", &prepare_javascript)).clone()

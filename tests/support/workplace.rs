@@ -28,7 +28,8 @@ fn program(name: &str) -> Command {
 /// SHOT without a network, with a radius that suits the small generated shapes: what costs least.
 pub const SHOT: [&str; 6] = ["--descriptor", "shot", "-k", "40", "--shot-radius", "0.2"];
 
-/// A temporary folder, in memory where there is such a disk: tests replace many small files, and each waits for a device.
+/// A temporary folder, in memory where there is such a disk: tests replace many small files, and each waits for a
+/// device.
 pub fn scratch() -> tempfile::TempDir {
     let in_memory = Path::new("/dev/shm");
     tempfile::tempdir_in(in_memory).unwrap_or_else(|_| tempfile::tempdir().unwrap())

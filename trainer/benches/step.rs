@@ -1,9 +1,10 @@
 //! Seconds of a training step on one pair, on 1 and 2 threads: `cargo bench --workspace --bench step`.
 //!
-//! A DiffusionNet (4 blocks of width 128, 128 eigenfunctions) on whole meshes of 5000 vertices, functional maps of both
-//! directions, the spectral loss and InfoNCE; and the paper's network (7 blocks of width 352, k = 120) on points. Prints the least
-//! and the median seconds of several steps and, on Linux, the least CPU seconds. Options of every bench: `-- --help`;
-//! `runtime/benches/peers/step.py` takes the DiffusionNet's step in PyTorch on what `--export` wrote.
+//! A DiffusionNet (4 blocks of width 128, 128 eigenfunctions) on whole meshes of 5000 vertices, functional maps of
+//! both directions, the spectral loss and InfoNCE; and the paper's network (7 blocks of width 352, k = 120) on
+//! points. Prints the least and the median seconds of several steps and, on Linux, the least CPU seconds. Options of
+//! every bench: `-- --help`; `runtime/benches/peers/step.py` takes the DiffusionNet's step in PyTorch on what
+//! `--export` wrote.
 
 #[path = "../../runtime/benches/support/report.rs"]
 mod report;

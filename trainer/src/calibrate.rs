@@ -1,7 +1,8 @@
-//! The calibration of the quality estimate: what the measures of a map say of its error, fitted on maps whose errors are known.
+//! The calibration of the quality estimate: what the measures of a map say of its error, fitted on maps whose errors
+//! are known.
 //!
-//! The logarithm of the error is fitted by ridge regression, the odds that a map is bad by logistic regression with the good and
-//! the bad maps of equal weight; both on [`Calibration::features`].
+//! The logarithm of the error is fitted by ridge regression, the odds that a map is bad by logistic regression with
+//! the good and the bad maps of equal weight; both on [`Calibration::features`].
 
 use fmnet::quality::{Calibration, Quality};
 use thiserror::Error;

@@ -1,8 +1,9 @@
 //! Checkpoints: everything that a run needs to go on exactly where it was.
 //!
-//! A safetensors file with every parameter under its name, Adam's two moments under `adam.first.NAME` and `adam.second.NAME`,
-//! and the running statistics; its metadata holds the configuration, the number of minibatches done and the best validation. Minibatches are a function of seed and number, so no
-//! generator needs saving. Written to a temporary name and renamed.
+//! A safetensors file with every parameter under its name, Adam's two moments under `adam.first.NAME` and
+//! `adam.second.NAME`, and the running statistics; its metadata holds the configuration, the number of minibatches
+//! done and the best validation. Minibatches are a function of seed and number, so no generator needs saving. Written
+//! to a temporary name and renamed.
 
 use crate::config::TrainConfig;
 use crate::network::{BatchMoments, Network, Statistics, parameter_values, set_parameter_values};

@@ -1,4 +1,5 @@
-//! The settings of a training run: one type for the configuration file, the command line, the saved copy and the defaults.
+//! The settings of a training run: one type for the configuration file, the command line, the saved copy and the
+//! defaults.
 
 use crate::dataset::Split;
 use crate::losses::LossOptions;
@@ -21,7 +22,8 @@ mod earlier;
 pub enum Sampling {
     /// Every vertex with the same probability.
     Uniform,
-    /// With probability proportional to the vertex's area, so that dense regions do not dominate (the paper, for scans).
+    /// With probability proportional to the vertex's area, so that dense regions do not dominate (the paper, for
+    /// scans).
     Area,
 }
 
@@ -76,8 +78,8 @@ macro_rules! train_config {
         #[derive(Clone, Debug, Default, clap::Args)]
         pub struct TrainOverrides {
             $( $(#[doc = $doc])+ #[arg(long $(, short = $short)?)] pub $name: Option<$kind>, )*
-            /// Any setting by its name in the file, as in `--set loss.spectral=0.1` or `--set network.kind=residual`; may be given
-            /// several times
+            /// Any setting by its name in the file, as in `--set loss.spectral=0.1` or `--set network.kind=residual`;
+            /// may be given several times
             #[arg(long, value_name = "NAME=VALUE")] pub set: Vec<String>,
         }
 
@@ -101,8 +103,8 @@ train_config! {
     out ('o'): PathBuf = PathBuf::from("runs/default"),
     /// Folder where preprocessed shapes are kept; empty: OUT/cache
     cache: PathBuf = PathBuf::new(),
-    /// Weights that the training starts from: a checkpoint, a model file (.onnx) of a DiffusionNet, or embedded, the built-in model;
-    /// empty: random ones
+    /// Weights that the training starts from: a checkpoint, a model file (.onnx) of a DiffusionNet, or embedded, the
+    /// built-in model; empty: random ones
     initial: PathBuf = PathBuf::new(),
     /// Splits to train on: train, validation, test, separated by commas
     splits: List<Split> = List(vec![Split::Train]),
@@ -367,7 +369,8 @@ impl TrainConfig {
         }
     }
 
-    /// Whether training needs points that correspond: the residual network sees nothing else, and most losses compare them.
+    /// Whether training needs points that correspond: the residual network sees nothing else, and most losses compare
+    /// them.
     pub(crate) fn needs_points(&self) -> bool {
         self.diffusion().is_none() || self.loss.spectral > 0.0 || self.loss.needs_points()
     }

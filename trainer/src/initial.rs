@@ -1,7 +1,7 @@
 //! The network that a new run begins with: random weights, those of a checkpoint, or those of a model file.
 //!
-//! A model file has all that a DiffusionNet computes with, so that who has no checkpoint, as nobody has of the built-in model, can
-//! train it on. Adam begins anew in each case.
+//! A model file has all that a DiffusionNet computes with, so that who has no checkpoint, as nobody has of the
+//! built-in model, can train it on. Adam begins anew in each case.
 
 use crate::checkpoint::Checkpoint;
 use crate::config::TrainConfig;

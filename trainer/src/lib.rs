@@ -1,7 +1,8 @@
-//! Trains the descriptor network through the functional map (Litany et al. 2017, "Deep Functional Maps") and exports it to ONNX.
+//! Trains the descriptor network through the functional map (Litany et al. 2017, "Deep Functional Maps") and exports
+//! it to ONNX.
 //!
-//! What the program `fmnet-train` does, as a library. Geometry, caching and evaluation come from the crate `fmnet`; this one adds
-//! datasets, a network with gradients and the loop around them.
+//! What the program `fmnet-train` does, as a library. Geometry, caching and evaluation come from the crate `fmnet`;
+//! this one adds datasets, a network with gradients and the loop around them.
 //!
 //! | | module |
 //! |---|---|

@@ -18,7 +18,8 @@ const WIDTH: usize = 640;
 /// What the plot shows, in bounded memory, however long the run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
-    /// Sum of the steps, sum of the logarithms of their losses, and how many they are, for each group of `stride` steps.
+    /// Sum of the steps, sum of the logarithms of their losses, and how many they are, for each group of `stride`
+    /// steps.
     groups: Vec<(f64, f64, usize)>,
     /// Steps in a full group, a power of two.
     stride: usize,

@@ -1,12 +1,12 @@
-//! What training needs of each shape, computed once and kept on disk: eigenbasis, gradients, SHOT, the points of its group
-//! and the geodesic distances between a pool of them.
+//! What training needs of each shape, computed once and kept on disk: eigenbasis, gradients, SHOT, the points of its
+//! group and the geodesic distances between a pool of them.
 //!
 //! Only points, pools and the place of the arrays stay in memory; a minibatch reads the arrays of its two shapes
 //! ([`PreparedShape::arrays`]), so that there may be more shapes than memory.
 //!
-//! A full matrix of distances would take 900 MB at 15K vertices. The loss only compares points of a minibatch, so each group of
-//! shapes gets a random pool of points, from which its minibatches are drawn. Distances are kept as 16-bit numbers, in steps
-//! of 1/16384 of sqrt(area): 12 MB a shape for a pool of 2500.
+//! A full matrix of distances would take 900 MB at 15K vertices. The loss only compares points of a minibatch, so
+//! each group of shapes gets a random pool of points, from which its minibatches are drawn. Distances are kept as
+//! 16-bit numbers, in steps of 1/16384 of sqrt(area): 12 MB a shape for a pool of 2500.
 
 use crate::dataset::{Correspondence, DatasetError, MISSING, ShapeEntry};
 use fmnet::cache::{Cache, CacheKey, Decoder, Encoder};
@@ -297,7 +297,8 @@ pub struct Pool {
     distances: Vec<u16>,
 }
 
-/// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the nearest.
+/// Takes the points from input vertices to the working mesh: to the vertex itself where it survived, else to the
+/// nearest.
 fn work_points(shape: &Shape, mesh: &Mesh, input_points: &[u32]) -> Vec<u32> {
     let work_of_input = shape.way_back.work_of_input();
     let lost: Vec<u32> = input_points
@@ -386,8 +387,8 @@ impl Pool {
         self.points.is_empty()
     }
 
-    /// Distances between some points of the pool, `[q]`, as `[q, q]` in units of sqrt(area), at most 4; none where they were
-    /// not computed.
+    /// Distances between some points of the pool, `[q]`, as `[q, q]` in units of sqrt(area), at most 4; none where
+    /// they were not computed.
     ///
     /// # Panics
     /// If a point is not in the pool.

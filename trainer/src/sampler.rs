@@ -1,10 +1,10 @@
 //! Minibatches: which pair, which points.
 //!
-//! The residual network sees points one by one, so a minibatch is one index set of points of a pair, the same for both shapes.
-//! A network that sees the surface gets whole meshes, and points are drawn from its output. Either way point `i` of the source
-//! corresponds with point `i` of the target; where the source is a part, the target has further points. Losses without ground truth
-//! take no points of whole meshes. Minibatch `b` of a run
-//! depends on the seed and on `b` alone, so a resumed run draws what the uninterrupted one would have.
+//! The residual network sees points one by one, so a minibatch is one index set of points of a pair, the same for
+//! both shapes. A network that sees the surface gets whole meshes, and points are drawn from its output. Either way
+//! point `i` of the source corresponds with point `i` of the target; where the source is a part, the target has
+//! further points. Losses without ground truth take no points of whole meshes. Minibatch `b` of a run depends on the
+//! seed and on `b` alone, so a resumed run draws what the uninterrupted one would have.
 
 use crate::config::{Sampling, TrainConfig};
 use crate::dataset::MISSING;
@@ -23,8 +23,8 @@ use thiserror::Error;
 /// Draws minibatches from prepared shapes.
 pub struct Sampler<'a> {
     shapes: &'a [PreparedShape],
-    /// Source and target of every pair that corresponds, both directions, of each group; a group is drawn as often as it has
-    /// shapes.
+    /// Source and target of every pair that corresponds, both directions, of each group; a group is drawn as often as
+    /// it has shapes.
     pairs: Vec<Vec<(usize, usize)>>,
     config: &'a TrainConfig,
 }
@@ -82,8 +82,8 @@ impl<'a> Sampler<'a> {
     /// Lists the pairs.
     ///
     /// # Errors
-    /// If no two shapes of a group share enough points (of the pool, where distances between them are needed), the larger
-    /// of 50 and `k`; where no loss needs points, if no group has two shapes.
+    /// If no two shapes of a group share enough points (of the pool, where distances between them are needed), the
+    /// larger of 50 and `k`; where no loss needs points, if no group has two shapes.
     pub fn new(shapes: &'a [PreparedShape], config: &'a TrainConfig) -> Result<Self, SamplerError> {
         let sampler = Self { shapes, pairs: Vec::new(), config };
         let least = MIN_COMMON_POINTS.max(config.k);
@@ -111,8 +111,8 @@ impl<'a> Sampler<'a> {
     /// Minibatch number `index` of the run, from 0: one pair or several.
     ///
     /// # Errors
-    /// If fewer than 2 of the points drawn on a whole are on its part, the arrays of a shape cannot be read, or the ground
-    /// truth does not make a functional map.
+    /// If fewer than 2 of the points drawn on a whole are on its part, the arrays of a shape cannot be read, or the
+    /// ground truth does not make a functional map.
     pub fn batch(&self, index: u64) -> Result<Vec<PairBatch>, SamplerError> {
         let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed);
         rng.set_stream(index + 1);
@@ -167,8 +167,8 @@ impl<'a> Sampler<'a> {
         one
     }
 
-    /// Points that both shapes have, ascending; of their pools, where distances between them are needed or points are all
-    /// that the network sees.
+    /// Points that both shapes have, ascending; of their pools, where distances between them are needed or points are
+    /// all that the network sees.
     fn common_points(&self, source: &PreparedShape, target: &PreparedShape) -> Vec<u32> {
         if self.of_pool() {
             let in_target = |point: &&u32| target.pool.points.binary_search(point).is_ok();
@@ -182,9 +182,9 @@ impl<'a> Sampler<'a> {
         self.config.diffusion().is_none() || self.config.loss.soft_error > 0.0
     }
 
-    /// Draws points of the target without replacement: those that the source has too, ascending, and all, the same ones
-    /// first. Only a part lacks some: its whole is sampled everywhere, or its descriptors would be compared with those of
-    /// a part.
+    /// Draws points of the target without replacement: those that the source has too, ascending, and all, the same
+    /// ones first. Only a part lacks some: its whole is sampled everywhere, or its descriptors would be compared with
+    /// those of a part.
     fn draw(
         &self,
         source: &PreparedShape,
@@ -282,7 +282,8 @@ impl<'a> Sampler<'a> {
         let [phi, psi] = &functions;
         let forth = fmnet::fmap::from_points(phi, psi).map_err(wrong)?;
         let back = match source.entry.is_part() {
-            // What lies outside the part says nothing of its functions: the restriction to the part, see `fmnet::fmap::part`.
+            // What lies outside the part says nothing of its functions: the restriction to the part, see
+            // `fmnet::fmap::part`.
             true => forth.transposed(),
             false => fmnet::fmap::from_points(psi, phi).map_err(wrong)?,
         };
@@ -290,7 +291,8 @@ impl<'a> Sampler<'a> {
     }
 }
 
-/// What a DiffusionNet is given of a shape: the wave kernel signature beside the scaled SHOT descriptors, and the operators.
+/// What a DiffusionNet is given of a shape: the wave kernel signature beside the scaled SHOT descriptors, and the
+/// operators.
 pub fn diffusion_input(options: &DiffusionOptions, arrays: ShapeArrays) -> NetworkInput {
     let n = arrays.n();
     let mut features = Matrix::zeros(n, options.inputs());

@@ -1,9 +1,9 @@
 //! The soft correspondence and the soft error loss (paper, equations "soft_corr" and "lossf").
 //!
-//! `P = |Psi C Phi^T A|` `[m_target, m_source]` with normalised columns; each column belongs to a source point. The area
-//! weights `A` scale whole columns, which the normalisation undoes, so they do not appear here. With `D` the geodesic
-//! distances on the target from each source point's match to the target's points, the loss is that of the authors' code,
-//! `sum((P o D)^2) / (2 m_source m_target)`.
+//! `P = |Psi C Phi^T A|` `[m_target, m_source]` with normalised columns; each column belongs to a source point. The
+//! area weights `A` scale whole columns, which the normalisation undoes, so they do not appear here. With `D` the
+//! geodesic distances on the target from each source point's match to the target's points, the loss is that of the
+//! authors' code, `sum((P o D)^2) / (2 m_source m_target)`.
 
 use crate::device::contiguous;
 use crate::numeric::{MatrixView, Real, matmul, matmul_split, vectorized};
@@ -124,8 +124,8 @@ impl<T: Real> SoftErrorOp<T> {
         }
     }
 
-    /// Replaces the columns of `Psi C Phi^T` (here rows) by the gradient of the loss; returns the sums over the columns of
-    /// the soft and of the hard error.
+    /// Replaces the columns of `Psi C Phi^T` (here rows) by the gradient of the loss; returns the sums over the
+    /// columns of the soft and of the hard error.
     fn columns(&self, soft: &mut [T], distances: &[T]) -> (f64, f64) {
         let Sizes { m_source, m_target, .. } = self.sizes;
         let scale = 1.0 / (m_source * m_target) as f64;

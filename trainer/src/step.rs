@@ -30,27 +30,30 @@ pub struct ShapeBatch {
     pub points: Vec<u32>,
     /// Where the points lie between vertices, for the contrastive loss; `None` where they are vertices.
     pub places: Option<Places>,
-    /// Geodesic distances between the points `[m, m]` in units of sqrt(area), for the soft error. Needed of the target; given
-    /// of the source too, the pair is used in both directions at once, at the cost of little more than one.
+    /// Geodesic distances between the points `[m, m]` in units of sqrt(area), for the soft error. Needed of the
+    /// target; given of the source too, the pair is used in both directions at once, at the cost of little more than
+    /// one.
     pub distances: Option<Matrix<f32>>,
 }
 
-/// A pair of which point `i` of the source corresponds to point `i` of the target. Where the source is a part of the target,
-/// the target has further points, those that the part lacks.
+/// A pair of which point `i` of the source corresponds to point `i` of the target. Where the source is a part of the
+/// target, the target has further points, those that the part lacks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairBatch {
     /// The shape that is mapped.
     pub source: ShapeBatch,
     /// The shape that it is mapped to.
     pub target: ShapeBatch,
-    /// Whether the source is a part of the target: the functional map is then solved for from the whole to the part, and only
-    /// used from the part to the whole (see [`fmnet::fmap::part`]).
+    /// Whether the source is a part of the target: the functional map is then solved for from the whole to the part,
+    /// and only used from the part to the whole (see [`fmnet::fmap::part`]).
     pub source_is_part: bool,
     /// Pairs (source point, target point) that do not correspond, for the siamese loss.
     pub negatives: Vec<(u32, u32)>,
-    /// The functional maps of the ground truth, `[k_target, k_source]` and `[k_source, k_target]`, for the spectral loss.
+    /// The functional maps of the ground truth, `[k_target, k_source]` and `[k_source, k_target]`, for the spectral
+    /// loss.
     pub ground_truth: Option<[Matrix; 2]>,
-    /// Points between which soft assignments are made, for the coupling: for the map from the source to the target, and back.
+    /// Points between which soft assignments are made, for the coupling: for the map from the source to the target,
+    /// and back.
     pub assignment: Option<[AssignmentPoints; 2]>,
 }
 
@@ -86,8 +89,8 @@ pub struct StepOptions {
 pub struct StepStats {
     /// The loss.
     pub loss: f64,
-    /// Mean geodesic error over sqrt(area) on the samples of the match by the soft map's largest entry; NaN without the soft
-    /// error.
+    /// Mean geodesic error over sqrt(area) on the samples of the match by the soft map's largest entry; NaN without
+    /// the soft error.
     pub hard_error: f64,
     /// Largest condition number of `F F^T` of all pairs and directions (1 without functional maps).
     pub condition: f64,

@@ -10,8 +10,8 @@ pub(crate) fn random(seed: u64, len: usize) -> Vec<f64> {
     (0..len).map(|_| generator.random_range(-1.0..1.0)).collect()
 }
 
-/// Asserts that the gradient of the scalar `loss` at `x` (f64) equals the central differences, to `tolerance` relative to
-/// the largest entry.
+/// Asserts that the gradient of the scalar `loss` at `x` (f64) equals the central differences, to `tolerance`
+/// relative to the largest entry.
 pub(crate) fn check_gradient(x: &Tensor, loss: impl Fn(&Tensor) -> Result<Tensor>, tolerance: f64) {
     const STEP: f64 = 1e-5;
     let variable = Var::from_tensor(x).unwrap();

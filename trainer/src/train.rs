@@ -1,7 +1,9 @@
-//! The order of the stages in training: dataset -> prepared shapes -> minibatches -> steps -> validation -> checkpoints.
+//! The order of the stages in training: dataset -> prepared shapes -> minibatches -> steps -> validation ->
+//! checkpoints.
 //!
-//! A run's folder holds `config.toml`, `metrics.jsonl` (an event a line), `plot.svg` (loss and validation error so far),
-//! `last.safetensors` and `best.safetensors`. Running the same command again goes on from `last.safetensors` with the minibatches that the uninterrupted run would have seen.
+//! A run's folder holds `config.toml`, `metrics.jsonl` (an event a line), `plot.svg` (loss and validation error so
+//! far), `last.safetensors` and `best.safetensors`. Running the same command again goes on from `last.safetensors`
+//! with the minibatches that the uninterrupted run would have seen.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{ConfigError, TrainConfig};
@@ -115,7 +117,8 @@ pub enum TrainError {
     Tensor(#[from] candle_core::Error),
 }
 
-/// The checkpoint of a run's folder that its model is made of: the best validated one, the last where nothing was validated.
+/// The checkpoint of a run's folder that its model is made of: the best validated one, the last where nothing was
+/// validated.
 pub fn best_checkpoint(run: &Path) -> PathBuf {
     let best = run.join(BEST);
     if best.is_file() { best } else { run.join(LAST) }
@@ -192,7 +195,8 @@ fn entries(config: &TrainConfig) -> Result<Vec<ShapeEntry>, TrainError> {
     Ok(entries)
 }
 
-/// The shapes of the validation split; where a group has only parts there, its first whole shape too, which they are matched to.
+/// The shapes of the validation split; where a group has only parts there, its first whole shape too, which they are
+/// matched to.
 fn validation_entries(config: &TrainConfig) -> Result<Vec<ShapeEntry>, TrainError> {
     let all = entries(config)?;
     let mut chosen: Vec<ShapeEntry> =
@@ -252,8 +256,8 @@ pub fn prepare_options(config: &TrainConfig) -> PrepareOptions {
     }
 }
 
-/// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates, may
-/// differ. The number of steps may not: the learning rate depends on it.
+/// The checkpoint in the run's folder, if it is of this configuration; folders, and how often it saves and validates,
+/// may differ. The number of steps may not: the learning rate depends on it.
 fn resume(config: &TrainConfig) -> Result<Option<Checkpoint>, TrainError> {
     let path = config.out.join(LAST);
     if !path.is_file() {

@@ -51,8 +51,8 @@ pub struct ValidationResult {
 }
 
 impl Validation {
-    /// Draws at most `config.validation_pairs` pairs of corresponding shapes, as many of each group as can be, and processes
-    /// their shapes. A part is a source only, so its group needs a whole among the shapes.
+    /// Draws at most `config.validation_pairs` pairs of corresponding shapes, as many of each group as can be, and
+    /// processes their shapes. A part is a source only, so its group needs a whole among the shapes.
     ///
     /// # Errors
     /// If a shape cannot be read or processed, or the cache cannot be written.
@@ -94,8 +94,8 @@ impl Validation {
         self.pairs.is_empty()
     }
 
-    /// Matches every pair as the runtime would with a model of this run, parts with [`FmapSolver::Part`]. NaN where there are
-    /// no pairs.
+    /// Matches every pair as the runtime would with a model of this run, parts with [`FmapSolver::Part`]. NaN where
+    /// there are no pairs.
     ///
     /// # Errors
     /// If the network, a functional map or a point map fails.

@@ -1,9 +1,10 @@
 //! The library as a WebAssembly module for the page's workers.
 //!
-//! A match is three runs: [`describe`] of either shape, which may go on at the same time in two workers, and [`match_described`]. Each
-//! run has an instance of the module to itself, so that nothing is left over from the last one. It sends back everything by one
-//! imported function, `page.send(kind, data)`: while it runs `event`, a stage or a warning in JSON, and at the end what it made; or instead
-//! `error`, a text for people, of bad input, or `panic`, of a failure of the library.
+//! A match is three runs: [`describe`] of either shape, which may go on at the same time in two workers, and
+//! [`match_described`]. Each run has an instance of the module to itself, so that nothing is left over from the last
+//! one. It sends back everything by one imported function, `page.send(kind, data)`: while it runs `event`, a stage or
+//! a warning in JSON, and at the end what it made; or instead `error`, a text for people, of bad input, or `panic`,
+//! of a failure of the library.
 
 mod run;
 
@@ -53,7 +54,8 @@ pub unsafe extern "C" fn describe(
     answered(|| run::describe(&name, file, (whole_area > 0.0).then_some(whole_area)));
 }
 
-/// Matches two shapes that [`describe`] sent. Sends `summary` (JSON), `viewer` (HTML) and the files `map.txt`, `map.csv` and `pair.glb`.
+/// Matches two shapes that [`describe`] sent. Sends `summary` (JSON), `viewer` (HTML) and the files `map.txt`,
+/// `map.csv` and `pair.glb`.
 ///
 /// # Safety
 /// As for [`describe`].

@@ -9,7 +9,8 @@ use crate::point_map::PointMap;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Raised with every change by which the same meshes, model and options give another map within a version of the library.
+/// Raised with every change by which the same meshes, model and options give another map within a version of the
+/// library.
 const REVISION: u8 = 5;
 
 /// Keys of maps: hashes of both meshes, the model, every option and the version of the library.
@@ -88,7 +89,8 @@ pub fn made_from(map: &Path) -> Made {
     }
 }
 
-/// Writes a map and its key beside it. Without its key a map is made anew, so it never stands beside the key of another one.
+/// Writes a map and its key beside it. Without its key a map is made anew, so it never stands beside the key of
+/// another one.
 ///
 /// # Errors
 /// If a file cannot be written.

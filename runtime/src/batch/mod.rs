@@ -1,7 +1,7 @@
 //! Many pairs: the list of them, the names of their maps, and what a map that is there was made from.
 //!
-//! These are the rules of `fmnet-infer batch`: a program that follows them, on one machine or many, writes the same files, and each takes
-//! up what the other has begun.
+//! These are the rules of `fmnet-infer batch`: a program that follows them, on one machine or many, writes the same
+//! files, and each takes up what the other has begun.
 
 mod map_key;
 mod pairs;

@@ -46,8 +46,8 @@ pub enum PairsError {
 /// Two names of a line.
 type Names<'a> = [&'a [u8]; 2];
 
-/// Reads a list of pairs, one a line; their maps are `SOURCE__TARGET.EXTENSION` in the folder `out`. Mesh files are relative to `root`,
-/// by default the folder of the list.
+/// Reads a list of pairs, one a line; their maps are `SOURCE__TARGET.EXTENSION` in the folder `out`. Mesh files are
+/// relative to `root`, by default the folder of the list.
 ///
 /// # Errors
 /// If the list cannot be read, a line is no pair, `root` is no folder, or two pairs would write the same file.
@@ -61,7 +61,8 @@ pub fn read_pairs(
     decode_pairs(&bytes, list, root, out, extension)
 }
 
-/// [`read_pairs`] of bytes at hand; `list` is their name in errors, and its folder that of the meshes where `root` is none.
+/// [`read_pairs`] of bytes at hand; `list` is their name in errors, and its folder that of the meshes where `root` is
+/// none.
 ///
 /// # Errors
 /// As [`read_pairs`].
@@ -118,7 +119,8 @@ fn file_of(root: &Path, name: &[u8]) -> PathBuf {
 /// The two names of a line: of all ways to read it the one by which most files exist, of several the first.
 fn names<'a>(line: &'a [u8], exists: impl Fn(&[u8]) -> bool) -> Option<Names<'a>> {
     let begins = |i: &usize| line[*i] == b'#' && *i > 0 && line[*i - 1].is_ascii_whitespace();
-    // A name may have a # of its own: the line as it is, then without what may be a comment, the shortest comment first.
+    // A name may have a # of its own: the line as it is, then without what may be a comment, the shortest comment
+    // first.
     let ends = std::iter::once(line.len()).chain((0..line.len()).rev().filter(begins).take(16));
     let readings = ends.flat_map(|end| readings(line[..end].trim_ascii()));
     let scored = readings.map(|names| (names.iter().filter(|name| exists(name)).count(), names));
@@ -127,7 +129,8 @@ fn names<'a>(line: &'a [u8], exists: impl Fn(&[u8]) -> bool) -> Option<Names<'a>
     (!is_comment).then_some(best.1)
 }
 
-/// Every way to take two names from a text: split at a tab, a comma, a semicolon, white space; or at any white space where there is more.
+/// Every way to take two names from a text: split at a tab, a comma, a semicolon, white space; or at any white space
+/// where there is more.
 fn readings(text: &[u8]) -> Vec<Names<'_>> {
     let separators: [fn(u8) -> bool; 4] =
         [|b| b == b'\t', |b| b.is_ascii_whitespace(), |b| b == b',', |b| b == b';'];

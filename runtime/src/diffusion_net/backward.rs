@@ -7,11 +7,11 @@ use crate::numeric::{MatrixView, Real, matmul, vectorized};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The gradient of the parameters, `[p]`, given that of the descriptors, `[n, outputs]`, and what the forward pass on the
-/// same arrays kept.
+/// The gradient of the parameters, `[p]`, given that of the descriptors, `[n, outputs]`, and what the forward pass on
+/// the same arrays kept.
 ///
-/// A diffusion time at its lower bound gets no gradient that would shorten it. Multi-threaded; the same bytes for any number
-/// of threads.
+/// A diffusion time at its lower bound gets no gradient that would shorten it. Multi-threaded; the same bytes for any
+/// number of threads.
 ///
 /// # Errors
 /// If an array has another length than the sizes ask for, or the activations are of another pass.
@@ -204,8 +204,8 @@ impl<T: Real> BlockSums<T> {
         Self { mlp, rotations: [of_u, of_v], coefficients }
     }
 
-    /// Adds what a chunk gives, given the gradient of its output, `[rows, width]`; returns that of its input but for the
-    /// part through the coefficients.
+    /// Adds what a chunk gives, given the gradient of its output, `[rows, width]`; returns that of its input but for
+    /// the part through the coefficients.
     fn add_chunk(
         &mut self,
         block: &Block<T>,

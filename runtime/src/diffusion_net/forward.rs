@@ -33,8 +33,8 @@ pub(super) struct ChunkActivations<T> {
     pub(super) hidden: [Vec<T>; 2],
 }
 
-/// Descriptors `[n, outputs]` of the input functions `[n, inputs]` (both row-major), and what [`super::backward`] needs where
-/// `keep` says so.
+/// Descriptors `[n, outputs]` of the input functions `[n, inputs]` (both row-major), and what [`super::backward`]
+/// needs where `keep` says so.
 ///
 /// Multi-threaded; the same bytes for any number of threads.
 ///

@@ -1,11 +1,11 @@
-//! DiffusionNet (Sharp, Attaiki, Crane and Ovsjanikov 2022, "DiffusionNet: Discretization agnostic learning on surfaces"):
-//! forward and backward on plain slices.
+//! DiffusionNet (Sharp, Attaiki, Crane and Ovsjanikov 2022, "DiffusionNet: Discretization agnostic learning on
+//! surfaces"): forward and backward on plain slices.
 //!
-//! The network maps functions on a surface, `[n, inputs]`, to descriptors, `[n, outputs]`: a linear layer, `blocks` residual
-//! blocks of `width` channels, a linear layer. A block spreads each channel by heat diffusion of a learned time, which the
-//! first `k` eigenpairs of the Laplacian give, and sees directions through the gradients of what it spread. With `E`
-//! `[n, k]`, `A` and `lambda` the eigenvectors, vertex areas and eigenvalues at unit area, and `G_x`, `G_y` `[n, k]` the
-//! gradients of the eigenvectors in a tangent frame at each vertex
+//! The network maps functions on a surface, `[n, inputs]`, to descriptors, `[n, outputs]`: a linear layer, `blocks`
+//! residual blocks of `width` channels, a linear layer. A block spreads each channel by heat diffusion of a learned
+//! time, which the first `k` eigenpairs of the Laplacian give, and sees directions through the gradients of what it
+//! spread. With `E` `[n, k]`, `A` and `lambda` the eigenvectors, vertex areas and eigenvalues at unit area, and
+//! `G_x`, `G_y` `[n, k]` the gradients of the eigenvectors in a tangent frame at each vertex
 //! ([`EigenGradients`](crate::spectral::EigenGradients)):
 //!
 //! ```text
@@ -15,11 +15,12 @@
 //! out = x + W3 relu(W2 relu(W1 [x, d, g]))           [n, width], with biases
 //! ```
 //!
-//! Turning a tangent frame changes nothing; mirroring the shape changes the sign of `J`'s part, which is how the network
-//! tells left from right. All gradients lie in the span of the eigenvectors, so that everything is a dense product.
+//! Turning a tangent frame changes nothing; mirroring the shape changes the sign of `J`'s part, which is how the
+//! network tells left from right. All gradients lie in the span of the eigenvectors, so that everything is a dense
+//! product.
 //!
-//! Parameters are one flat slice in the order of [`Architecture::parameters`], weights `[in, out]`. Shapes may differ in `n`.
-//! Rows are worked on in chunks of a fixed size, so that results do not depend on the number of threads.
+//! Parameters are one flat slice in the order of [`Architecture::parameters`], weights `[in, out]`. Shapes may differ
+//! in `n`. Rows are worked on in chunks of a fixed size, so that results do not depend on the number of threads.
 
 mod backward;
 mod block;
@@ -39,8 +40,8 @@ const CHUNK: usize = 256;
 const PIECES: usize = 4;
 /// Shorter diffusion times count as this.
 pub const MIN_TIME: f64 = 1e-8;
-/// A lower `-lambda t` counts as this. What it leaves of a frequency, `4e-18`, is nothing; less would become subnormal in single
-/// precision, with which processors take several times as long.
+/// A lower `-lambda t` counts as this. What it leaves of a frequency, `4e-18`, is nothing; less would become
+/// subnormal in single precision, with which processors take several times as long.
 pub const LEAST_EXPONENT: f64 = -40.0;
 
 /// The sizes of a network.

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Share of matches whose error is at most a threshold, for rising thresholds.
 ///
-/// The share at 0 is that of exact matches, as in the paper's figures. Unmatched vertices (NaN) count in the denominator and lie
-/// beyond every threshold.
+/// The share at 0 is that of exact matches, as in the paper's figures. Unmatched vertices (NaN) count in the
+/// denominator and lie beyond every threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorCurve {
     /// Normalised errors, ascending.
@@ -90,8 +90,8 @@ pub fn curves_csv(curves: &[(&str, &ErrorCurve)]) -> String {
 /// follow.
 ///
 /// # Errors
-/// In words, with the line: no header, a line of another number of columns, a cell that is no number, or a quote that is
-/// not closed.
+/// In words, with the line: no header, a line of another number of columns, a cell that is no number, or a quote that
+/// is not closed.
 pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> {
     let mut records = csv_records(text)?.into_iter();
     let (line, mut header) =
@@ -122,8 +122,8 @@ pub fn curves_from_csv(text: &str) -> Result<Vec<(String, ErrorCurve)>, String> 
     Ok(names.into_iter().zip(curves).collect())
 }
 
-/// The cells of each line that is not blank, with its number from 1. A cell in quotes may hold commas, line breaks and, doubled,
-/// quotes.
+/// The cells of each line that is not blank, with its number from 1. A cell in quotes may hold commas, line breaks
+/// and, doubled, quotes.
 fn csv_records(text: &str) -> Result<Vec<(usize, Vec<String>)>, String> {
     let mut records = Vec::new();
     let (mut cells, mut cell) = (Vec::new(), String::new());

@@ -8,13 +8,14 @@ use crate::point_map::PointMap;
 /// Normalised geodesic error `d_Y(y, y*) / sqrt(area(Y))` of each correct match `(x, y*)` of the ground truth, in its
 /// order, where the map sends `x` to `y`.
 ///
-/// `solver` and `area`, in squared units, belong to the target mesh. The error is NaN where the map leaves `x` unmatched;
-/// [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say how they count these. Vertices at one place are one vertex, so a match on a
-/// duplicate of the right vertex is exact. Where `y` and `y*` are on different components, no path leads from one to the other, and the
-/// straight line through space counts.
+/// `solver` and `area`, in squared units, belong to the target mesh. The error is NaN where the map leaves `x`
+/// unmatched; [`ErrorSummary`] and [`ErrorCurve`](super::ErrorCurve) say how they count these. Vertices at one place
+/// are one vertex, so a match on a duplicate of the right vertex is exact. Where `y` and `y*` are on different
+/// components, no path leads from one to the other, and the straight line through space counts.
 ///
 /// # Errors
-/// If the map, the ground truth and the solver are not for the same meshes, or the map names a vertex that does not exist.
+/// If the map, the ground truth and the solver are not for the same meshes, or the map names a vertex that does not
+/// exist.
 pub fn geodesic_errors(
     map: &PointMap,
     ground_truth: &GroundTruth,
@@ -41,11 +42,11 @@ pub fn geodesic_errors(
     Ok(matches().map(|(y, _)| y.and_then(|_| distances.next()).map_or(f32::NAN, error)).collect())
 }
 
-/// As [`geodesic_errors`], of the points on the target's surface that the map and the ground truth name; where one knows vertices only, of
-/// these.
+/// As [`geodesic_errors`], of the points on the target's surface that the map and the ground truth name; where one
+/// knows vertices only, of these.
 ///
-/// Within a triangle the distance is the straight line; else it is the mean over the corners of both by their weights, which overrates
-/// short distances by less than an edge. `mesh` is the target.
+/// Within a triangle the distance is the straight line; else it is the mean over the corners of both by their
+/// weights, which overrates short distances by less than an edge. `mesh` is the target.
 ///
 /// # Errors
 /// As [`geodesic_errors`], and if a point names a triangle that does not exist.

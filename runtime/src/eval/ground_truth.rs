@@ -30,11 +30,12 @@ pub enum GroundTruthSource {
     Identity,
     /// `identity:N`: the first N vertices correspond, vertex i with vertex i.
     FirstVertices(usize),
-    /// `FILE`: a map file from source to target, or points on the target's surface, one for each source vertex (`.corr`,
-    /// `.baryc_gt`).
+    /// `FILE`: a map file from source to target, or points on the target's surface, one for each source vertex
+    /// (`.corr`, `.baryc_gt`).
     Map(PathBuf),
-    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex). Where one has points on a
-    /// surface (`.corr`), each source point counts at its nearest vertex, and of several at one vertex the nearest.
+    /// `A,B`: two lists; line i of A (a source vertex) corresponds with line i of B (a target vertex). Where one has
+    /// points on a surface (`.corr`), each source point counts at its nearest vertex, and of several at one vertex
+    /// the nearest.
     Lists(PathBuf, PathBuf),
 }
 
@@ -60,8 +61,8 @@ impl FromStr for GroundTruthSource {
 }
 
 impl GroundTruthSource {
-    /// As [`str::parse`], of a text that may hold names of files which are no Unicode. A file that is called so is a map, whatever commas
-    /// are in its name.
+    /// As [`str::parse`], of a text that may hold names of files which are no Unicode. A file that is called so is a
+    /// map, whatever commas are in its name.
     ///
     /// # Errors
     /// As [`str::parse`].
@@ -141,7 +142,8 @@ fn check_lists([source, target]: [&PathBuf; 2], [n_source, n_target]: [usize; 2]
     Err(EvalError::ListMismatch { source_file, n_source, target_file, n_target })
 }
 
-/// For every vertex of `mesh` the point of `to` whose fellow in `from` lies nearest to it, among those that lie nearest to no other vertex.
+/// For every vertex of `mesh` the point of `to` whose fellow in `from` lies nearest to it, among those that lie
+/// nearest to no other vertex.
 fn at_nearest_vertices(
     from: &[Option<SurfacePoint>],
     to: &[Option<SurfacePoint>],
@@ -196,7 +198,8 @@ impl GroundTruth {
         }
     }
 
-    /// The right points on the target's surface, one for each of [`GroundTruth::pairs`], where they are known finer than a vertex.
+    /// The right points on the target's surface, one for each of [`GroundTruth::pairs`], where they are known finer
+    /// than a vertex.
     pub fn points(&self) -> Option<&[SurfacePoint]> {
         self.points.as_deref()
     }

@@ -14,7 +14,8 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Counts `values` in `n_bins` (at least one) bins from 0 to `upper` (above 0); what lies outside is in the total only.
+    /// Counts `values` in `n_bins` (at least one) bins from 0 to `upper` (above 0); what lies outside is in the total
+    /// only.
     pub fn new(values: &[f32], n_bins: usize, upper: f64) -> Self {
         let n_bins = n_bins.max(1);
         let mut counts = vec![0; n_bins];

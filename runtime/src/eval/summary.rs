@@ -8,9 +8,10 @@ use super::ErrorCurve;
 
 /// The errors of a map, or of several maps taken together, in a few numbers. Errors are lengths over sqrt(area).
 ///
-/// Unmatched vertices (NaN) are left out of [`mean`](Self::mean) and [`worst`](Self::worst), but count as wrong in every share and
-/// in the curve: a map cannot gain by leaving hard vertices out unseen. What cannot be measured is NaN: mean and worst where no vertex is
-/// matched, everything where no correct match is known. JSON has `null` for it.
+/// Unmatched vertices (NaN) are left out of [`mean`](Self::mean) and [`worst`](Self::worst), but count as wrong in
+/// every share and in the curve: a map cannot gain by leaving hard vertices out unseen. What cannot be measured is
+/// NaN: mean and worst where no vertex is matched, everything where no correct match is known. JSON has `null` for
+/// it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorSummary {
     /// Number of correct matches known.

@@ -10,7 +10,8 @@ use crate::spectral::Eigenbasis;
 
 /// Two functional maps between the same bases, one in each direction.
 ///
-/// Between isometric shapes each is the transpose of the other; where they differ, each knows something the other does not.
+/// Between isometric shapes each is the transpose of the other; where they differ, each knows something the other
+/// does not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BothMaps {
     /// `C12`, `[k_target, k_source]`: takes functions on the source to functions on the target.
@@ -26,8 +27,8 @@ impl BothMaps {
         Self { forth, back }
     }
 
-    /// The functional maps of a pair of point maps, `[source to target, target to source]`: each point map pulls functions
-    /// back, so that `C12 = Psi^T A_target Phi[T21]` and `C21 = Phi^T A_source Psi[T12]`.
+    /// The functional maps of a pair of point maps, `[source to target, target to source]`: each point map pulls
+    /// functions back, so that `C12 = Psi^T A_target Phi[T21]` and `C21 = Phi^T A_source Psi[T12]`.
     ///
     /// # Errors
     /// As [`functional_map_of`].
@@ -52,8 +53,8 @@ impl BothMaps {
         mean_with_transpose(&self.forth, &self.back)
     }
 
-    /// The point map from the source to the target; by [`Comparison::Joint`] of both maps, else of `forth` alone. That of the
-    /// other direction is the one of [`BothMaps::reversed`].
+    /// The point map from the source to the target; by [`Comparison::Joint`] of both maps, else of `forth` alone.
+    /// That of the other direction is the one of [`BothMaps::reversed`].
     ///
     /// # Errors
     /// As [`Embedding::forth`].
@@ -66,8 +67,8 @@ impl BothMaps {
         self.embedding(comparison, basis_source, basis_target)?.forth()
     }
 
-    /// The embedding in which the vertices of both shapes are compared: by [`Comparison::Joint`] that of both maps, else of `forth`
-    /// alone.
+    /// The embedding in which the vertices of both shapes are compared: by [`Comparison::Joint`] that of both maps,
+    /// else of `forth` alone.
     ///
     /// # Errors
     /// As [`Embedding::joint`].
@@ -86,11 +87,11 @@ impl BothMaps {
 
 /// The regularised functional maps of both directions, by [`regularized`] with the same weight of the mask.
 ///
-/// The two solves fit different sides of the same equation, `C12 F^ = G^` and `F^ = C21 G^`, and what either gets wrong where
-/// descriptors disagree is not what the other gets wrong.
+/// The two solves fit different sides of the same equation, `C12 F^ = G^` and `F^ = C21 G^`, and what either gets
+/// wrong where descriptors disagree is not what the other gets wrong.
 ///
-/// Arguments and errors as in [`regularized`]. The rank is the smaller, the condition and the residual the larger ones of the
-/// two solves.
+/// Arguments and errors as in [`regularized`]. The rank is the smaller, the condition and the residual the larger
+/// ones of the two solves.
 pub fn both_maps(
     f_hat: &Matrix,
     g_hat: &Matrix,
@@ -108,8 +109,8 @@ pub fn both_maps(
     Ok((BothMaps { forth, back }, info))
 }
 
-/// The functional maps of both directions by a solver: [`both_maps`] for [`FmapSolver::Joint`]; the others find one map, and
-/// the map back is its adjoint. Arguments as in [`functional_map`].
+/// The functional maps of both directions by a solver: [`both_maps`] for [`FmapSolver::Joint`]; the others find one
+/// map, and the map back is its adjoint. Arguments as in [`functional_map`].
 ///
 /// # Errors
 /// As [`functional_map`].
@@ -130,15 +131,15 @@ pub fn functional_maps(
     both_maps(f_hat, g_hat, &source, &target, weight)
 }
 
-/// The bidirectional functional map: the mean of the map `C`, `[k_target, k_source]`, that [`regularized`] finds from the
-/// source to the target and of the transpose of the one from the target to the source.
+/// The bidirectional functional map: the mean of the map `C`, `[k_target, k_source]`, that [`regularized`] finds from
+/// the source to the target and of the transpose of the one from the target to the source.
 ///
-/// Between isometric shapes at unit area a functional map is orthogonal, so the transpose of the map back is the map itself.
-/// On FAUST pairs the mean error of the raw map falls by a quarter, and a weaker mask,
+/// Between isometric shapes at unit area a functional map is orthogonal, so the transpose of the map back is the map
+/// itself. On FAUST pairs the mean error of the raw map falls by a quarter, and a weaker mask,
 /// [`super::FmapSolver::BIDIRECTIONAL_WEIGHT`], then is best.
 ///
-/// Arguments and errors as in [`regularized`], rank and condition as in [`both_maps`]; the residual is that of the mean in
-/// `C F^ = G^`.
+/// Arguments and errors as in [`regularized`], rank and condition as in [`both_maps`]; the residual is that of the
+/// mean in `C F^ = G^`.
 pub fn bidirectional(
     f_hat: &Matrix,
     g_hat: &Matrix,

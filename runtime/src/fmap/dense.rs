@@ -49,7 +49,8 @@ pub(crate) fn thin_svd(matrix: MatRef<'_, f64>) -> Result<ThinSvd, FmapError> {
     Ok(ThinSvd { u, s, v })
 }
 
-/// Largest over smallest eigenvalue of a symmetric positive semi-definite `[k, k]` matrix; infinite where it is singular.
+/// Largest over smallest eigenvalue of a symmetric positive semi-definite `[k, k]` matrix; infinite where it is
+/// singular.
 pub(super) fn condition(gram: &Matrix) -> Result<f64, FmapError> {
     let k = gram.rows();
     let mut values = Diag::<f64>::zeros(k);

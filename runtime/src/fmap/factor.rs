@@ -64,8 +64,8 @@ impl Factor {
         }
     }
 
-    /// Replaces every column of `right`, `[k, m]`, by its solution. The work is done on a copy of its own: what faer rounds depends
-    /// on where in memory a column begins, and a [`Mat`] always begins at the same alignment.
+    /// Replaces every column of `right`, `[k, m]`, by its solution. The work is done on a copy of its own: what faer
+    /// rounds depends on where in memory a column begins, and a [`Mat`] always begins at the same alignment.
     pub(crate) fn solve(&self, mut right: MatMut<'_, f64>) {
         match self {
             Self::Cholesky(lower) => {

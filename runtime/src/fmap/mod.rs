@@ -62,8 +62,8 @@ pub enum FmapSolver {
         /// Weight of the mask in each solve. Range 0 upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
         weight: f64,
     },
-    /// For a source that is a part of the target, with bases in one unit: the transpose of the regularised solve from the
-    /// whole to the part, [`part`].
+    /// For a source that is a part of the target, with bases in one unit: the transpose of the regularised solve from
+    /// the whole to the part, [`part`].
     Part {
         /// Weight of the mask. Range 0 upwards, default [`FmapSolver::DEFAULT_MASK_WEIGHT`].
         weight: f64,
@@ -75,12 +75,12 @@ impl FmapSolver {
     pub const DEFAULT_MASK_WEIGHT: f64 = 0.1;
     /// The weight of the mask where the mean of both directions is taken.
     pub const BIDIRECTIONAL_WEIGHT: f64 = 0.03;
-    /// The weight of the mask for a part, by models whose maps of wholes are joint: on parts of dogs 1 to 30 are alike after the wavelet filter,
-    /// and raw maps are worse at 0.1.
+    /// The weight of the mask for a part, by models whose maps of wholes are joint: on parts of dogs 1 to 30 are
+    /// alike after the wavelet filter, and raw maps are worse at 0.1.
     pub const PART_WEIGHT: f64 = 1.0;
 
-    /// What to match with, given what the network was trained with: both directions where it was the regularised solve. The
-    /// paper's least squares stay what they are.
+    /// What to match with, given what the network was trained with: both directions where it was the regularised
+    /// solve. The paper's least squares stay what they are.
     pub fn for_matching(self) -> Self {
         match self {
             Self::Regularized { .. } => Self::Bidirectional { weight: Self::BIDIRECTIONAL_WEIGHT },
@@ -90,7 +90,8 @@ impl FmapSolver {
 }
 
 impl FmapSolver {
-    /// What to match a part with, given what was asked for, if anything, and what suits wholes: of two directions only one holds there.
+    /// What to match a part with, given what was asked for, if anything, and what suits wholes: of two directions
+    /// only one holds there.
     pub fn for_part(chosen: Option<Self>, of_wholes: Self) -> Self {
         match (chosen, of_wholes) {
             (None, Self::Joint { .. }) => Self::Part { weight: Self::PART_WEIGHT },
@@ -172,8 +173,8 @@ impl FmapSolver {
 /// What a solve found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FmapInfo {
-    /// Number of independent directions kept in the worst conditioned system, at most the number of eigenfunctions on the
-    /// side solved from: `k_source`, for a part `k_target`, for both directions the smaller.
+    /// Number of independent directions kept in the worst conditioned system, at most the number of eigenfunctions on
+    /// the side solved from: `k_source`, for a part `k_target`, for both directions the smaller.
     pub rank: usize,
     /// Condition number of what was inverted: for least squares the ratio of the extreme singular values of
     /// `F^`, infinite where `F^` has linearly dependent rows; for the regularised solve a lower bound, from
@@ -273,8 +274,8 @@ pub enum FmapError {
 /// The functional map `C`, `[k_target, k_source]`, that takes the descriptors' coefficients `f_hat`,
 /// `[k_source, q]`, to `g_hat`, `[k_target, q]` (see [`Eigenbasis::project`]).
 ///
-/// The mask takes eigenvalues relative to each shape's own area; for [`FmapSolver::Part`] as they are, in one unit of both.
-/// For [`FmapSolver::Joint`] it is the map from the source to the target alone; [`functional_maps`] gives both.
+/// The mask takes eigenvalues relative to each shape's own area; for [`FmapSolver::Part`] as they are, in one unit of
+/// both. For [`FmapSolver::Joint`] it is the map from the source to the target alone; [`functional_maps`] gives both.
 ///
 /// # Errors
 /// If the arrays do not fit together, are empty or not finite, the weight is out of range, or a decomposition fails.

@@ -4,12 +4,13 @@ use super::dense::ThinSvd;
 use super::{FmapError, dense};
 use crate::Matrix;
 
-/// Weight of the penalty on the size of `C`, relative to the mean diagonal of the Gram matrix of the source's functions.
+/// Weight of the penalty on the size of `C`, relative to the mean diagonal of the Gram matrix of the source's
+/// functions.
 const RIDGE: f64 = 3e-3;
 
-/// The `C`, `[k_target, k_source]`, that minimises `sum |C phi - psi|^2 + w |C|^2` over the rows `phi` of `source`, `[m, k_source]`,
-/// and `psi` of `target`, `[m, k_target]`: the eigenfunctions at `m` corresponding points. The small `w` keeps functions
-/// bounded that live where no point is, such as on stray pieces: they go to zero.
+/// The `C`, `[k_target, k_source]`, that minimises `sum |C phi - psi|^2 + w |C|^2` over the rows `phi` of `source`,
+/// `[m, k_source]`, and `psi` of `target`, `[m, k_target]`: the eigenfunctions at `m` corresponding points. The small
+/// `w` keeps functions bounded that live where no point is, such as on stray pieces: they go to zero.
 ///
 /// # Errors
 /// If the numbers of points differ, there are none, an entry is not finite, or the functions vanish at all points.

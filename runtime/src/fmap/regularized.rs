@@ -24,9 +24,9 @@ pub fn scale_free_eigenvalues(basis: &Eigenbasis) -> Vec<f64> {
 /// (lambda / s)^0.5`, `s` the largest of all eigenvalues, `D = (re_i - re_j)^2 + (im_i - im_j)^2`, where `re
 /// = g / (g^2 + 1)`, `im = 1 / (g^2 + 1)`. Entries lie between 0 and 1/2.
 ///
-/// The eigenvalues are `[k_source]` and `[k_target]`. The mask does not change when both shapes are scaled together. To let
-/// shapes of different size match, pass eigenvalues times area, as [`scale_free_eigenvalues`] gives them. Eigenvalues below
-/// zero, which are rounded zeros, count as zero.
+/// The eigenvalues are `[k_source]` and `[k_target]`. The mask does not change when both shapes are scaled together.
+/// To let shapes of different size match, pass eigenvalues times area, as [`scale_free_eigenvalues`] gives them.
+/// Eigenvalues below zero, which are rounded zeros, count as zero.
 pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) -> Matrix {
     let largest = eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(0.0, f64::max);
     let scale = if largest > 0.0 { largest } else { 1.0 };
@@ -52,8 +52,8 @@ pub fn resolvent_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) ->
 /// solution of least norm, and [`FmapInfo::rank`] tells.
 ///
 /// # Errors
-/// If the matrices are empty, not finite or of different width, a list of eigenvalues has another length, or the weight is
-/// negative or not finite.
+/// If the matrices are empty, not finite or of different width, a list of eigenvalues has another length, or the
+/// weight is negative or not finite.
 pub fn regularized(
     f_hat: &Matrix,
     g_hat: &Matrix,

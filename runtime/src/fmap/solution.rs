@@ -1,8 +1,9 @@
 //! A solved functional map that knows its gradient.
 //!
-//! Row `i` of `C` solves `S_i c_i = F^ g_i` with `S_i = F^ F^T + w d diag(D_i)`, `d = tr(F^ F^T) / k`. For a gradient `dC` let
-//! `m_i = S_i^-1 dc_i` be the rows of `M`. Then `dG^ = M F^` and `dF^ = M^T (G^ - C F^) - C^T M F^ + (2 / k) e F^`, where
-//! `e = -w sum_ij m_ij D_ij c_ij`. Least squares are the case `w = 0`. Where a system is truncated, its subspace is held fixed.
+//! Row `i` of `C` solves `S_i c_i = F^ g_i` with `S_i = F^ F^T + w d diag(D_i)`, `d = tr(F^ F^T) / k`. For a gradient
+//! `dC` let `m_i = S_i^-1 dc_i` be the rows of `M`. Then `dG^ = M F^` and
+//! `dF^ = M^T (G^ - C F^) - C^T M F^ + (2 / k) e F^`, where `e = -w sum_ij m_ij D_ij c_ij`. Least squares are the
+//! case `w = 0`. Where a system is truncated, its subspace is held fixed.
 
 use super::dense::multiply;
 use super::factor::Factor;

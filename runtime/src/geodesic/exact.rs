@@ -10,18 +10,19 @@ use crate::Mesh;
 
 /// Widening of the shadow of a vertex, in radians, so that rounding leaves no gap at its borders.
 const SHADOW_MARGIN: f64 = 1e-7;
-/// Windows that are followed, for each vertex. Clean surfaces stay far below; where faces of other vertices lie on each other and
-/// share edges their number doubles at every crossing.
+/// Windows that are followed, for each vertex. Clean surfaces stay far below; where faces of other vertices lie on
+/// each other and share edges their number doubles at every crossing.
 const WINDOWS_PER_VERTEX: usize = 2000;
 
 /// Exact geodesic distances from `source` to every vertex, `[n]`, in the mesh's unit; infinite on other
 /// components.
 ///
-/// Windows are propagated in the order of their distance, as Chen and Han's algorithm with the priority queue and
-/// the window filter of Xin and Wang (2009). A vertex where a path can bend (total angle above 2 pi, on the
-/// boundary, or non-manifold) becomes the source of windows into the directions in its shadow. Where surfaces lie on each other
-/// and share edges the work is bounded: beyond 2000 windows for each vertex paths go on along edges, which makes upper bounds. Takes about
-/// 0.06 s for 7000 vertices; [`GeodesicSolver`](super::GeodesicSolver) is some fifty times faster.
+/// Windows are propagated in the order of their distance, as Chen and Han's algorithm with the priority queue and the
+/// window filter of Xin and Wang (2009). A vertex where a path can bend (total angle above 2 pi, on the boundary, or
+/// non-manifold) becomes the source of windows into the directions in its shadow. Where surfaces lie on each other
+/// and share edges the work is bounded: beyond 2000 windows for each vertex paths go on along edges, which makes
+/// upper bounds. Takes about 0.06 s for 7000 vertices; [`GeodesicSolver`](super::GeodesicSolver) is some fifty times
+/// faster.
 ///
 /// # Panics
 /// If `source` is not a vertex of the mesh.

@@ -8,8 +8,9 @@ use super::window::{Hit, Window, open_windows};
 
 /// Relative slack within which two lengths of the same path agree.
 const ROUNDING: f64 = 1e-9;
-/// Windows that one search may open, for each neighbour sought. Clean surfaces stay far below; where faces lie on each other or
-/// share edges by the dozen their number would double at every crossing. Beyond it the lines found so far have to do.
+/// Windows that one search may open, for each neighbour sought. Clean surfaces stay far below; where faces lie on
+/// each other or share edges by the dozen their number would double at every crossing. Beyond it the lines found so
+/// far have to do.
 const WINDOWS_PER_NEIGHBOR: usize = 200;
 
 /// Finds the straight geodesics out of one vertex after another, with working memory that is reused.

@@ -107,7 +107,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Distances to the vertices that no edge onward leads to, as may happen on rough surfaces: through their own edges.
+    /// Distances to the vertices that no edge onward leads to, as may happen on rough surfaces: through their own
+    /// edges.
     fn reach_the_rest(&mut self) {
         let mut missed: Vec<u32> = (0..self.distances.len() as u32)
             .filter(|&v| self.distances[v as usize] == f32::INFINITY)

@@ -35,8 +35,8 @@ impl Default for GeodesicOptions {
 /// is then the shortest chain of such lines. It is an upper bound of the exact distance ([`exact`](super::exact()))
 /// and equal to it as long as the shortest path has no straight part longer than the neighbourhood.
 ///
-/// Boundary vertices at one place, or 1e-5 of the diagonal apart, are one vertex, so meshes whose triangles share no vertices are surfaces all the same. Where
-/// a closed surface touches itself, nothing is joined.
+/// Boundary vertices at one place, or 1e-5 of the diagonal apart, are one vertex, so meshes whose triangles share no
+/// vertices are surfaces all the same. Where a closed surface touches itself, nothing is joined.
 ///
 /// Lengths are in the mesh's unit. Vertices on another component are infinitely far. A boundary is an obstacle that
 /// paths go around. Where more than two faces share an edge a path may pass between any two of them; at other
@@ -149,12 +149,12 @@ impl GeodesicSolver {
         self.distances_between(&all)
     }
 
-    /// Distance of each pair of vertices, `[pairs]`, in parallel. Between components no path leads, and the straight line through space
-    /// counts: for matches, of which some are on the wrong component, that is the rule.
+    /// Distance of each pair of vertices, `[pairs]`, in parallel. Between components no path leads, and the straight
+    /// line through space counts: for matches, of which some are on the wrong component, that is the rule.
     ///
-    /// Pairs are grouped by whichever of their vertices gives fewer groups, by the second where it does not matter, and each search ends at the
-    /// farthest other vertex of its group: the distances of nearly correct matches to the correct ones cost next to nothing, and so do those
-    /// of a map that sends everything to a few vertices.
+    /// Pairs are grouped by whichever of their vertices gives fewer groups, by the second where it does not matter,
+    /// and each search ends at the farthest other vertex of its group: the distances of nearly correct matches to the
+    /// correct ones cost next to nothing, and so do those of a map that sends everything to a few vertices.
     pub fn pair_distances(&self, pairs: &[(u32, u32)]) -> Vec<f32> {
         let mut pairs: Vec<(u32, u32)> =
             pairs.iter().map(|&(a, b)| (self.welded[a as usize], self.welded[b as usize])).collect();

@@ -244,7 +244,8 @@ fn split_collapsed_faces(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<LooseEdge>) {
     (proper, loose)
 }
 
-/// The first of all faces with the same vertices: the others change no distance, and at each a search would double its lines.
+/// The first of all faces with the same vertices: the others change no distance, and at each a search would double
+/// its lines.
 fn without_copies(faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let keyed: Vec<(u32, [u32; 3])> = (0..).zip(faces.iter().copied()).collect();
     let copies = repeated_faces(&keyed);

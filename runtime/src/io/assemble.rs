@@ -70,8 +70,8 @@ impl MeshBuilder {
         self.corner_uvs = self.faces.iter().map(|face| [uv(&face[0]), uv(&face[1]), uv(&face[2])]).collect();
     }
 
-    /// Gives each vertex the mean colour of the faces around it, white where none has one; what the colours are of is noted. Colours
-    /// that the vertices have already stay.
+    /// Gives each vertex the mean colour of the faces around it, white where none has one; what the colours are of is
+    /// noted. Colours that the vertices have already stay.
     pub(super) fn spread_face_colors(&mut self, of_face: &[Option<[u8; 4]>], what: &str) {
         if of_face.iter().all(Option::is_none) {
             return;

@@ -25,10 +25,11 @@ pub struct ReadInfo {
     pub n_polygons: usize,
     /// Faces of fewer than three corners (points, edges), which were left out.
     pub n_ignored_faces: usize,
-    /// What changes the geometry: places of the file that were understood in a way that may not be meant, or left out. In sentences for
-    /// the user of any command.
+    /// What changes the geometry: places of the file that were understood in a way that may not be meant, or left
+    /// out. In sentences for the user of any command.
     pub warnings: Vec<String>,
-    /// What the file carries besides the geometry that was not kept, each as a noun: for who wants to carry attributes over.
+    /// What the file carries besides the geometry that was not kept, each as a noun: for who wants to carry
+    /// attributes over.
     pub left_out: Vec<String>,
     /// Names of groups and objects with faces in them, in the order of the file. They are not kept.
     pub groups: Vec<String>,

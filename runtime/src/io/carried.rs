@@ -35,7 +35,8 @@ impl Attributes {
         names
     }
 
-    /// These attributes, and those of `own` that are not among them; with the names of what of `own` they replace. Both are of one mesh.
+    /// These attributes, and those of `own` that are not among them; with the names of what of `own` they replace.
+    /// Both are of one mesh.
     pub fn beside(mut self, own: &Self) -> (Self, Vec<String>) {
         let mut kept = own.clone();
         let mut replaced = Self::default();
@@ -65,8 +66,8 @@ impl Attributes {
         (self, replaced.names())
     }
 
-    /// What of these attributes a mesh file at `path` cannot hold, each as a noun with the remedy. [`write_mesh`](super::write_mesh)
-    /// leaves it out.
+    /// What of these attributes a mesh file at `path` cannot hold, each as a noun with the remedy.
+    /// [`write_mesh`](super::write_mesh) leaves it out.
     pub fn not_held_by(&self, path: &Path) -> Vec<String> {
         let Some(format) = MeshFormat::from_path(path) else { return Vec::new() };
         let mut lost = Vec::new();
@@ -115,7 +116,8 @@ impl Attributes {
         }
     }
 
-    /// The files that [`write_mesh`](super::write_mesh) writes at `path` with these attributes: the mesh, its materials, its image.
+    /// The files that [`write_mesh`](super::write_mesh) writes at `path` with these attributes: the mesh, its
+    /// materials, its image.
     pub fn files_written(&self, path: &Path) -> Vec<PathBuf> {
         let mut files = vec![path.to_path_buf()];
         let Some(texture) = self.texture.as_ref().filter(|t| self.corner_uvs.is_some() && t.exists()) else {

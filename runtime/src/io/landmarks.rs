@@ -6,8 +6,8 @@ use super::IoError;
 use super::error::Parsed;
 use super::text::{Lines, Words, decode_text, quote};
 
-/// Reads landmarks, `[landmarks]`: 0-based vertices of source and target. A line with one vertex means it on both; `#` begins a
-/// comment. That is the format of pyFM and of `numpy.savetxt` with `fmt="%d"`.
+/// Reads landmarks, `[landmarks]`: 0-based vertices of source and target. A line with one vertex means it on both;
+/// `#` begins a comment. That is the format of pyFM and of `numpy.savetxt` with `fmt="%d"`.
 ///
 /// # Errors
 /// If the file cannot be read, or a line is no vertex or two.

@@ -1,7 +1,8 @@
 //! NumPy's `.npy`: matrices `[rows, cols]` and vectors `[n]` of floats and integers.
 //!
-//! Format: NumPy Enhancement Proposal 1, versions 1.0 to 3.0. Read are `f4`, `f8`, `bool` and integers of 1 to 8 bytes of either byte order, in C
-//! and Fortran order; written is C order, little-endian. The header is parsed here, since it may be hostile.
+//! Format: NumPy Enhancement Proposal 1, versions 1.0 to 3.0. Read are `f4`, `f8`, `bool` and integers of 1 to 8
+//! bytes of either byte order, in C and Fortran order; written is C order, little-endian. The header is parsed here,
+//! since it may be hostile.
 
 mod header;
 
@@ -98,8 +99,8 @@ npy_number!(i64, "<i8", |value| match value {
 
 /// Reads a `.npy` array of one or two dimensions as a matrix; one of `n` numbers becomes `[n, 1]`.
 ///
-/// Integers are converted to floats and `f8` to `f4` by rounding; floats to integers are an error, and so are integers too
-/// large for `T`.
+/// Integers are converted to floats and `f8` to `f4` by rounding; floats to integers are an error, and so are
+/// integers too large for `T`.
 ///
 /// # Errors
 /// If the file cannot be read, is no such array, ends early, or holds a number that does not fit `T`.
@@ -108,7 +109,8 @@ pub fn read_matrix<T: NpyNumber>(path: &Path) -> Result<Matrix<T>, IoError> {
     decode(&bytes).map_err(|e| e.in_file(path))
 }
 
-/// Reads a `.npy` array of one dimension, or of two of which one is 1, as `[n]`; numbers are converted as by [`read_matrix`].
+/// Reads a `.npy` array of one dimension, or of two of which one is 1, as `[n]`; numbers are converted as by
+/// [`read_matrix`].
 ///
 /// # Errors
 /// As [`read_matrix`], and if both dimensions are above 1.
@@ -208,7 +210,8 @@ pub(super) fn npz(path: &Path, _arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, I
     Err(IoError::Unwritable { path: path.into(), problem, remedy: "write a .csv file" })
 }
 
-/// The bytes of a `.npz` file of named arrays, as [`encode`] gives them: a zip archive without compression. `path` is for messages.
+/// The bytes of a `.npz` file of named arrays, as [`encode`] gives them: a zip archive without compression. `path` is
+/// for messages.
 #[cfg(not(target_arch = "wasm32"))]
 pub(super) fn npz(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, IoError> {
     let written = || -> zip::result::ZipResult<Vec<u8>> {

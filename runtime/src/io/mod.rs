@@ -62,14 +62,15 @@ pub use text::decode_text;
 use crate::Mesh;
 use error::Parsed;
 
-/// Reads a mesh and its attributes. The format is the content's where that bears a mark, else the extension's, else what the content
-/// suggests.
+/// Reads a mesh and its attributes. The format is the content's where that bears a mark, else the extension's, else
+/// what the content suggests.
 ///
 /// Polygons are split into triangle fans, several objects are concatenated in file order. What could not be
 /// kept is said in [`ReadInfo::warnings`] and [`ReadInfo::left_out`]. Text files may be in UTF-8 or UTF-16.
 ///
 /// # Errors
-/// If the file cannot be read, is of no known format, or breaks its rules: then with the line, byte or part where it does.
+/// If the file cannot be read, is of no known format, or breaks its rules: then with the line, byte or part where it
+/// does.
 pub fn read_mesh(path: &Path) -> Result<MeshFile, IoError> {
     let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
     decode_mesh(&bytes, path)
@@ -126,12 +127,12 @@ fn decode(bytes: &[u8], format: MeshFormat, folder: &Path) -> Parsed<MeshFile> {
 /// | `.glb` | rounded to f32 | yes | per corner, embedded | yes | yes |
 ///
 /// Vertex `i` of the mesh is vertex `i` of the file. GLB has texture coordinates per vertex only, so a vertex on a
-/// seam is repeated there, behind the `n` vertices of the mesh. A texture that is embedded or in another folder is written beside
-/// a `.ply` or `.obj` as `STEM_texture.png` (or whatever its extension).
+/// seam is repeated there, behind the `n` vertices of the mesh. A texture that is embedded or in another folder is
+/// written beside a `.ply` or `.obj` as `STEM_texture.png` (or whatever its extension).
 ///
 /// # Errors
-/// If the format is none of [`MeshFormat::WRITABLE`], an attribute has not the mesh's size, a skin's joint does not exist
-/// or comes before its parent, the mesh is empty and the format `.glb`, or a file cannot be written.
+/// If the format is none of [`MeshFormat::WRITABLE`], an attribute has not the mesh's size, a skin's joint does not
+/// exist or comes before its parent, the mesh is empty and the format `.glb`, or a file cannot be written.
 pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(), IoError> {
     check(path, mesh, attributes)?;
     match MeshFormat::from_path(path) {
@@ -146,7 +147,8 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, attributes: &Attributes) -> Result<(
     }
 }
 
-/// The bytes of a `.glb` file as [`write_mesh`] writes it; `path` is for messages, and an image is looked for in its folder.
+/// The bytes of a `.glb` file as [`write_mesh`] writes it; `path` is for messages, and an image is looked for in its
+/// folder.
 ///
 /// # Errors
 /// As [`write_mesh`], but for those of the written file.

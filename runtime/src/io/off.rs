@@ -111,8 +111,8 @@ fn read_vertices(lines: &mut Lines<'_>, header: &Header, builder: &mut MeshBuild
     Ok(uvs)
 }
 
-/// What stands between positions and texture coordinates: colours of three or four components and perhaps normals. The normals come first,
-/// but some programs write them behind the colours.
+/// What stands between positions and texture coordinates: colours of three or four components and perhaps normals.
+/// The normals come first, but some programs write them behind the colours.
 #[derive(Default)]
 struct Colors {
     /// The numbers of each vertex, and how many of them are the colour's.

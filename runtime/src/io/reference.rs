@@ -34,8 +34,9 @@ pub(super) fn bytes_of_path(path: &Path) -> Cow<'_, [u8]> {
 
 /// The file that a name refers to, seen from `folder`.
 ///
-/// Names come from other systems and other folders. Tried are, in this order: the name as it is; with `/` for `\`; its last parts only, as
-/// many as lead to a file in `folder`; each of these in whatever case; all of these with the bytes taken as Latin-1.
+/// Names come from other systems and other folders. Tried are, in this order: the name as it is; with `/` for `\`;
+/// its last parts only, as many as lead to a file in `folder`; each of these in whatever case; all of these with the
+/// bytes taken as Latin-1.
 pub(super) fn find_file(folder: &Path, name: &[u8]) -> Option<PathBuf> {
     let name = unquoted(name);
     if name.is_empty() || name.len() > MAX_NAME || name.contains(&0) {
@@ -68,7 +69,8 @@ fn find_parts(folder: &Path, name: &[u8]) -> Option<PathBuf> {
     })
 }
 
-/// The file below `folder` whose parts are called so, upper and lower case not told apart; of several the first by name.
+/// The file below `folder` whose parts are called so, upper and lower case not told apart; of several the first by
+/// name.
 fn in_any_case(folder: &Path, parts: &[&[u8]]) -> Option<PathBuf> {
     let (last, folders) = parts.split_last()?;
     let mut at = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_path_buf() };

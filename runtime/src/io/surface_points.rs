@@ -1,7 +1,7 @@
 //! Points on a mesh in files: `.corr` correspondences, and the `.baryc_gt` ground truth of SHREC'16.
 //!
-//! A line for each point: a triangle, 1-based in the order of the mesh file, and three barycentric weights. The triangle is -1
-//! where a mesh lacks the point; what follows on such a line does not matter.
+//! A line for each point: a triangle, 1-based in the order of the mesh file, and three barycentric weights. The
+//! triangle is -1 where a mesh lacks the point; what follows on such a line does not matter.
 
 use std::path::Path;
 

@@ -9,8 +9,8 @@ const BOM: &[u8] = b"\xEF\xBB\xBF";
 
 /// A text file's bytes as UTF-8 without a byte order mark.
 ///
-/// UTF-16 of either byte order is known by its mark, or without one by the zeros beside the first two characters. Bytes in any other
-/// encoding stay as they are.
+/// UTF-16 of either byte order is known by its mark, or without one by the zeros beside the first two characters.
+/// Bytes in any other encoding stay as they are.
 pub fn decode_text(bytes: &[u8]) -> Cow<'_, [u8]> {
     match bytes {
         [0xFF, 0xFE, rest @ ..] => decode_utf16(rest, u16::from_le_bytes),
@@ -29,8 +29,8 @@ fn decode_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Cow<'_, [u8]> {
 
 /// What stands before a comment.
 ///
-/// A `#` begins one wherever it stands, but not within `1.#INF`, `-1.#IND` and the like: so old run-times of Microsoft print numbers that
-/// are not finite.
+/// A `#` begins one wherever it stands, but not within `1.#INF`, `-1.#IND` and the like: so old run-times of
+/// Microsoft print numbers that are not finite.
 pub(super) fn without_comment(line: &[u8]) -> &[u8] {
     let mut from = 0;
     while let Some(at) = line[from..].iter().position(|&b| b == b'#').map(|at| at + from) {
@@ -196,7 +196,8 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// A decimal number, in whatever way a run-time prints it: also `nan`, `-nan(ind)`, `inf`, `1.#INF00`, and `1.0D+02` of Fortran.
+/// A decimal number, in whatever way a run-time prints it: also `nan`, `-nan(ind)`, `inf`, `1.#INF00`, and `1.0D+02`
+/// of Fortran.
 pub(super) fn float(word: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(word).ok()?;
     text.parse().ok().or_else(|| unusual_float(text))

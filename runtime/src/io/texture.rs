@@ -6,8 +6,8 @@ use super::attributes::Texture;
 use super::{IoError, write_atomically};
 
 impl Texture {
-    /// How a mesh file at `path` refers to the image: a name relative to its folder. An image that is elsewhere or embedded is
-    /// written beside the mesh; `None` where there is no such file to be read.
+    /// How a mesh file at `path` refers to the image: a name relative to its folder. An image that is elsewhere or
+    /// embedded is written beside the mesh; `None` where there is no such file to be read.
     pub(super) fn place_beside(&self, path: &Path) -> Result<Option<PathBuf>, IoError> {
         match self.placement(path) {
             Placement::Absent => Ok(None),

@@ -1,4 +1,5 @@
-//! Vertices without a finite position, as organised scans have them where nothing was measured. Of no face, they keep their number.
+//! Vertices without a finite position, as organised scans have them where nothing was measured. Of no face, they keep
+//! their number.
 
 use super::error::{ParseError, Parsed};
 use crate::mesh::vec3;

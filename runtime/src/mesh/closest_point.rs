@@ -10,7 +10,8 @@ const LEAF: usize = 4;
 /// The tree halves its triangles at each level, so that it is never deeper than this.
 const DEPTH: usize = 64;
 
-/// A mesh made ready for many queries. Building takes `O(m log m)`; a query takes `O(log m)` where the mesh is well spread.
+/// A mesh made ready for many queries. Building takes `O(m log m)`; a query takes `O(log m)` where the mesh is well
+/// spread.
 #[derive(Clone, Debug)]
 pub struct ClosestPoint<'a> {
     mesh: &'a Mesh,
@@ -30,16 +31,17 @@ struct Node {
     count: u32,
 }
 
-/// For each query the closest point on the mesh, `[q]`, `None` where the mesh has no triangle. Of several triangles at the same
-/// distance any may be given, but always the same.
+/// For each query the closest point on the mesh, `[q]`, `None` where the mesh has no triangle. Of several triangles
+/// at the same distance any may be given, but always the same.
 pub fn closest_points(mesh: &Mesh, queries: &[[f64; 3]]) -> Vec<Option<SurfacePoint>> {
     let tree = ClosestPoint::new(mesh);
     queries.par_iter().map(|&query| tree.find(query)).collect()
 }
 
-/// Takes points on one mesh to another one of the same surface in the same place, such as the repaired or the decimated mesh:
-/// each goes to the closest point of a triangle that faces the same way, so that none changes over to skin that touches
-/// skin. `None` stays `None`, and so becomes a point that has no such triangle within `limit` sqrt(area) of `from`.
+/// Takes points on one mesh to another one of the same surface in the same place, such as the repaired or the
+/// decimated mesh: each goes to the closest point of a triangle that faces the same way, so that none changes over to
+/// skin that touches skin. `None` stays `None`, and so becomes a point that has no such triangle within `limit`
+/// sqrt(area) of `from`.
 ///
 /// Whether `to` as a whole looks the same way as `from` or was turned round is found out from the points themselves.
 ///
@@ -89,8 +91,8 @@ impl<'a> ClosestPoint<'a> {
         self.search(query, |_| true)
     }
 
-    /// The closest point on a triangle whose normal has an angle below 90 degrees to `normal`, of any length; `None` where there
-    /// is none.
+    /// The closest point on a triangle whose normal has an angle below 90 degrees to `normal`, of any length; `None`
+    /// where there is none.
     pub fn find_facing(&self, query: [f64; 3], normal: [f64; 3]) -> Option<SurfacePoint> {
         self.search(query, |face| vec3::dot(self.mesh.face_cross(face as usize), normal) > 0.0)
     }

@@ -80,7 +80,8 @@ impl Mesh {
     /// Checks that every face index is in range and every coordinate finite.
     ///
     /// # Errors
-    /// If an index is out of range, a coordinate is not finite, or there are more vertices than 32-bit indices can name.
+    /// If an index is out of range, a coordinate is not finite, or there are more vertices than 32-bit indices can
+    /// name.
     pub fn new(vertices: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         let n_vertices = vertices.len();
         if n_vertices >= u32::MAX as usize {

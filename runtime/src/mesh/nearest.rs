@@ -11,8 +11,8 @@ pub fn nearest_vertices(points: &[[f64; 3]], queries: &[[f64; 3]]) -> Vec<u32> {
     nearest_k_vertices(points, queries, 1)
 }
 
-/// For each query point the indices of the `count` nearest of `points`, nearest first, `[q, count]`; where there are fewer
-/// points the last one repeats.
+/// For each query point the indices of the `count` nearest of `points`, nearest first, `[q, count]`; where there are
+/// fewer points the last one repeats.
 ///
 /// # Panics
 /// If `points` is empty or has a coordinate that is not finite while there are queries, or `count` is 0.

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Farthest point sampling by Euclidean distance: `start`, then always the vertex farthest from all before it.
 ///
-/// Gives `min(count, n)` different vertices in the order chosen, so that every prefix is a sampling too; the lowest index
-/// wins a tie. A `start` that is no vertex, or `count` 0, gives none.
+/// Gives `min(count, n)` different vertices in the order chosen, so that every prefix is a sampling too; the lowest
+/// index wins a tie. A `start` that is no vertex, or `count` 0, gives none.
 pub fn farthest_point_sampling(mesh: &Mesh, count: usize, start: u32) -> Vec<u32> {
     let vertices = mesh.vertices();
     let along = |axis: usize| vertices.iter().map(|p| p[axis]).collect::<Vec<f64>>();

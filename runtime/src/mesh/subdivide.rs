@@ -15,9 +15,9 @@ pub struct Subdivided {
 
 /// Cuts the longest edge in half, again and again, until there are `target` vertices.
 ///
-/// The surface stays what it is, to rounding, with its boundary and its topology; triangles become evenly large and no thinner
-/// than half as thin as they were (bisection of longest edges, Rivara 1984). A mesh of `target` vertices or more comes back as it is.
-/// Time is `O(n log n)`, the result the same on every machine.
+/// The surface stays what it is, to rounding, with its boundary and its topology; triangles become evenly large and
+/// no thinner than half as thin as they were (bisection of longest edges, Rivara 1984). A mesh of `target` vertices
+/// or more comes back as it is. Time is `O(n log n)`, the result the same on every machine.
 pub fn subdivide(mesh: &Mesh, target: usize) -> Subdivided {
     let mut cuts = Cuts::new(mesh);
     while cuts.vertices.len() < target {

@@ -42,8 +42,8 @@ impl SurfacePoint {
         mesh.faces()[self.face as usize][corner]
     }
 
-    /// The mean of the rows of the three corners by their weights, `[d]`: the value at this point of `d` functions that are
-    /// linear on every triangle. `values` is `[n, d]`, a row for each vertex of the mesh.
+    /// The mean of the rows of the three corners by their weights, `[d]`: the value at this point of `d` functions
+    /// that are linear on every triangle. `values` is `[n, d]`, a row for each vertex of the mesh.
     ///
     /// # Panics
     /// If the mesh has no such triangle, or the matrix has no such row.
@@ -54,7 +54,8 @@ impl SurfacePoint {
     }
 }
 
-/// Every vertex as a point on the mesh, `[n]`: a corner of the first triangle that has it; `None` for a vertex of no triangle.
+/// Every vertex as a point on the mesh, `[n]`: a corner of the first triangle that has it; `None` for a vertex of no
+/// triangle.
 pub fn vertices_on_surface(mesh: &Mesh) -> Vec<Option<SurfacePoint>> {
     let mut points = vec![None; mesh.n_vertices()];
     for (face, corners) in mesh.faces().iter().enumerate() {

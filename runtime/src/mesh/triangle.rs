@@ -4,8 +4,8 @@ use super::vec3;
 
 type Vec3 = [f64; 3];
 
-/// Barycentric weights of the point of the triangle `[a, b, c]` that is closest to `p`: none is negative, and they sum to 1. The
-/// triangle may be a line or a point.
+/// Barycentric weights of the point of the triangle `[a, b, c]` that is closest to `p`: none is negative, and they
+/// sum to 1. The triangle may be a line or a point.
 ///
 /// Ericson, Real-Time Collision Detection (2005), section 5.1.5: by Voronoi regions.
 pub fn closest_weights(p: Vec3, [a, b, c]: [Vec3; 3]) -> [f64; 3] {

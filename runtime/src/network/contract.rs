@@ -1,8 +1,8 @@
 //! The contract of a model file: its graph's inputs and output, and what travels in `metadata_props`.
 //!
-//! Graph: the inputs are quantities of a shape by name ([`Quantity`]), float32, at unit area; the output is `descriptors`,
-//! float32 `[n, d]`; the number of vertices `n` is dynamic; standard operators only. Format 1 has the input `shot` alone and
-//! d = 352. Metadata: the keys of [`ModelMetadata::to_pairs`], all under the prefix `fmnet.`.
+//! Graph: the inputs are quantities of a shape by name ([`Quantity`]), float32, at unit area; the output is
+//! `descriptors`, float32 `[n, d]`; the number of vertices `n` is dynamic; standard operators only. Format 1 has the
+//! input `shot` alone and d = 352. Metadata: the keys of [`ModelMetadata::to_pairs`], all under the prefix `fmnet.`.
 
 use super::NetworkError;
 use super::proto::{Model, Type, ValueInfo};

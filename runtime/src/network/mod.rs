@@ -1,8 +1,9 @@
 //! The descriptor network: the model file's contract, and its back-ends.
 //!
-//! A model is an ONNX file ([`contract`]). It runs through tract, which is built in (feature `tract`), or through onnxruntime
-//! (feature `ort`), whose library is loaded at run time from the path in the environment variable `ORT_DYLIB_PATH`. DiffusionNets that
-//! `fmnet-train` wrote run on the library's own kernels as well ([`NativeNetwork`]), by which they are adapted to a pair.
+//! A model is an ONNX file ([`contract`]). It runs through tract, which is built in (feature `tract`), or through
+//! onnxruntime (feature `ort`), whose library is loaded at run time from the path in the environment variable
+//! `ORT_DYLIB_PATH`. DiffusionNets that `fmnet-train` wrote run on the library's own kernels as well
+//! ([`NativeNetwork`]), by which they are adapted to a pair.
 
 pub mod contract;
 mod native;
@@ -27,8 +28,8 @@ use thiserror::Error;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Backend {
-    /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train` writes, with the
-    /// weights of the file, in two thirds of tract's time; tract for all other models.
+    /// The library's own kernels, which the adaptation to a pair runs on, for the DiffusionNets that `fmnet-train`
+    /// writes, with the weights of the file, in two thirds of tract's time; tract for all other models.
     #[default]
     Native,
     /// tract, pure Rust, built in.

@@ -1,7 +1,8 @@
 //! DiffusionNets of `fmnet-train` on the library's own kernels, with the weights of the ONNX file.
 //!
-//! The exporter names every constant after the parameter that it holds. A file that it wrote, and in which all of them are there
-//! in the right shape, is taken apart again; any other is left to the other back-ends. Tests hold the results of all to each other.
+//! The exporter names every constant after the parameter that it holds. A file that it wrote, and in which all of
+//! them are there in the right shape, is taken apart again; any other is left to the other back-ends. Tests hold the
+//! results of all to each other.
 
 use super::Engine;
 use super::contract::{Contract, Quantity};
@@ -158,7 +159,8 @@ impl Engine for NativeNetwork {
     }
 }
 
-/// The exporter's name of a parameter that it does not call by its own: products with `u` and `v` have the same weights.
+/// The exporter's name of a parameter that it does not call by its own: products with `u` and `v` have the same
+/// weights.
 fn name_in_graph(name: &str) -> String {
     for part in ["real", "imaginary"] {
         if let Some(block) = name.strip_suffix(&format!(".gradient.{part}")) {

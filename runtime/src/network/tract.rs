@@ -1,9 +1,9 @@
 //! The back-end on tract: pure Rust, built in.
 //!
-//! tract is fastest when it knows `n`, so the graph is optimised anew for each number of rows and kept while shapes of the same
-//! size follow. Where rows do not depend on each other, blocks of a fixed size are spread over the threads; other networks run on one thread
-//! each, as tract's own threads would make the program a fifth larger and longer to build, and DiffusionNets of `fmnet-train` run on the
-//! library's own kernels.
+//! tract is fastest when it knows `n`, so the graph is optimised anew for each number of rows and kept while shapes
+//! of the same size follow. Where rows do not depend on each other, blocks of a fixed size are spread over the
+//! threads; other networks run on one thread each, as tract's own threads would make the program a fifth larger and
+//! longer to build, and DiffusionNets of `fmnet-train` run on the library's own kernels.
 
 use super::Engine;
 use super::contract::{Contract, ModelInput};

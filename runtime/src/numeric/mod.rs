@@ -1,4 +1,5 @@
-//! What the fused CPU kernels of networks share: the scalar type, run-time dispatch to wide vectors, and matrix products.
+//! What the fused CPU kernels of networks share: the scalar type, run-time dispatch to wide vectors, and matrix
+//! products.
 
 mod matmul;
 

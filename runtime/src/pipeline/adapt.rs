@@ -1,8 +1,9 @@
 //! Adaptation of a network to a pair: steps of gradient descent on losses that need no ground truth.
 //!
-//! What a network gets wrong of a pair shows: its functional maps there and back do not undo each other, are not orthogonal, and
-//! differ from the ones of the point maps that the descriptors give (Cao, Roetzer and Bernard 2023). A few steps on that mend
-//! much. All is native: [`crate::diffusion_net`] forward and backward, [`FmapSolution`] for the functional maps, Adam.
+//! What a network gets wrong of a pair shows: its functional maps there and back do not undo each other, are not
+//! orthogonal, and differ from the ones of the point maps that the descriptors give (Cao, Roetzer and Bernard 2023).
+//! A few steps on that mend much. All is native: [`crate::diffusion_net`] forward and backward, [`FmapSolution`] for
+//! the functional maps, Adam.
 
 use super::pair::Pair;
 use crate::Matrix;
@@ -198,8 +199,9 @@ impl Assignment {
         Self { unit, lengths, cosines }
     }
 
-    /// `|C - Psi^+ P Phi|^2` for a map from the functions of `from` to those of `to`, where row `y` of `P` is the softmax of the
-    /// cosines of a row of `to` with those of `from`: its gradient by `C`, and those by the unit descriptors of `to` and `from`.
+    /// `|C - Psi^+ P Phi|^2` for a map from the functions of `from` to those of `to`, where row `y` of `P` is the
+    /// softmax of the cosines of a row of `to` with those of `from`: its gradient by `C`, and those by the unit
+    /// descriptors of `to` and `from`.
     ///
     /// `transposed`: `to` is the source.
     fn coupling(&self, map: &F64, to: &Fixed, from: &Fixed, transposed: bool) -> (F64, [F64; 2]) {

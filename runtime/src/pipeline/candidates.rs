@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 /// Steps of the adaptation of a doubtful pair.
 const ADAPTATION: usize = 10;
 
-/// Radius of SHOT where it stands in for a model that does not know the shapes, relative to sqrt(area): wide enough to tell a head from
-/// a hand.
+/// Radius of SHOT where it stands in for a model that does not know the shapes, relative to sqrt(area): wide enough
+/// to tell a head from a hand.
 const SHOT_RADIUS: f64 = 0.12;
 
 /// Probability that the first map is bad from which the cheapest other one is tried.
@@ -87,8 +87,8 @@ impl Tried {
         better
     }
 
-    /// Calls the map taken doubtful from half the usual probability on, where it is not the first: the best of several looks better than it
-    /// is.
+    /// Calls the map taken doubtful from half the usual probability on, where it is not the first: the best of
+    /// several looks better than it is.
     fn doubt_the_best(&mut self, usual: f64) {
         let Some(best) = self.candidates.iter_mut().skip(1).find(|candidate| candidate.taken) else { return };
         self.estimate.doubtful = self.estimate.bad >= usual / 2.0;

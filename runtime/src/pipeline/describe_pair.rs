@@ -9,11 +9,11 @@ use crate::events::Observer;
 pub type Named<'a> = (&'a str, &'a Mesh);
 
 impl Matcher {
-    /// [`Matcher::describe`] of both shapes of a pair, source first, at the same time; one after the other where both at once
-    /// would take more memory than there is.
+    /// [`Matcher::describe`] of both shapes of a pair, source first, at the same time; one after the other where both
+    /// at once would take more memory than there is.
     ///
-    /// With `partial` the source is a part of the target, in its unit: the area of the whole is that of the target as it is
-    /// matched, repaired.
+    /// With `partial` the source is a part of the target, in its unit: the area of the whole is that of the target as
+    /// it is matched, repaired.
     ///
     /// # Errors
     /// As [`Matcher::describe`] and [`Matcher::describe_part`].

@@ -23,8 +23,8 @@ pub struct DescribedShape {
 }
 
 impl DescribedShape {
-    /// The shape as bytes, in the byte order of the machine: meshes, the way back to the input's vertices, eigenbases and
-    /// descriptors.
+    /// The shape as bytes, in the byte order of the machine: meshes, the way back to the input's vertices, eigenbases
+    /// and descriptors.
     pub fn encode(&self) -> Vec<u8> {
         let mut payload = Encoder::default();
         self.shape.save(&mut payload);

@@ -21,8 +21,8 @@ pub trait Descriptor: std::fmt::Debug + Send + Sync {
     /// Its settings as bytes, which tell it from every other of its kind.
     fn settings(&self) -> Vec<u8>;
 
-    /// A value for each vertex of [`Shape::mesh`], `[n, d]`. Quantities are taken from the shape, which computes those that
-    /// are asked for.
+    /// A value for each vertex of [`Shape::mesh`], `[n, d]`. Quantities are taken from the shape, which computes
+    /// those that are asked for.
     ///
     /// # Errors
     /// If a quantity that it needs cannot be computed, or the descriptor itself fails; it names the shape.
@@ -102,8 +102,8 @@ impl Descriptor for NetworkDescriptor {
 }
 
 impl NetworkDescriptor {
-    /// The network's inputs in its order, each row-major in single precision, at unit area. Eigenpairs that a small mesh does
-    /// not have are zero, which adds nothing to any sum over eigenpairs.
+    /// The network's inputs in its order, each row-major in single precision, at unit area. Eigenpairs that a small
+    /// mesh does not have are zero, which adds nothing to any sum over eigenpairs.
     ///
     /// # Errors
     /// If a quantity cannot be computed; it names the shape.

@@ -15,8 +15,9 @@ use rayon::prelude::*;
 /// Eigenfunctions of the full meshes in upscaling.
 const UPSCALE_K: usize = 100;
 
-/// The map of the inputs' vertices by way of the surface: every vertex of the source has a place on the working mesh, that place
-/// a row in the embedding, the row a nearest point on the target's working mesh, and that point a place on the target's input.
+/// The map of the inputs' vertices by way of the surface: every vertex of the source has a place on the working mesh,
+/// that place a row in the embedding, the row a nearest point on the target's working mesh, and that point a place on
+/// the target's input.
 ///
 /// `map` is the map of the working meshes, `doubt`, `[n]`, how doubtful it is at each vertex of the source's.
 pub(super) fn on_inputs(
@@ -79,7 +80,8 @@ fn nearest_corner(point: &SurfacePoint, mesh: &Mesh) -> u32 {
     [b, c].into_iter().fold(a, |best, v| if distance(v) < distance(best) { v } else { best })
 }
 
-/// Takes a map of the full repaired source, whose targets are vertices of the input, to the vertices of the source's input.
+/// Takes a map of the full repaired source, whose targets are vertices of the input, to the vertices of the source's
+/// input.
 fn in_input_vertices(
     source: &Shape,
     target: &Shape,
@@ -98,8 +100,8 @@ fn in_input_vertices(
     }
 }
 
-/// The map of the inputs' vertices by a functional map of the full meshes that agrees with the map of the working ones (the paper's upscaling);
-/// where nothing was decimated, the map itself.
+/// The map of the inputs' vertices by a functional map of the full meshes that agrees with the map of the working
+/// ones (the paper's upscaling); where nothing was decimated, the map itself.
 pub(super) fn full_by_functional_map(
     pair: &Pair,
     map: &PointMap,

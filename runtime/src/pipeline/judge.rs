@@ -36,8 +36,8 @@ impl Judge<'_> {
         Ok((quality, estimate))
     }
 
-    /// Whether a map of wholes sends a region elsewhere. Regions of a part hang together by bridges between its holes, which tear where
-    /// nothing is wrong.
+    /// Whether a map of wholes sends a region elsewhere. Regions of a part hang together by bridges between its
+    /// holes, which tear where nothing is wrong.
     fn is_torn_apart(&self, found: &Found) -> bool {
         !self.pair.is_part() && !self.displaced_regions(found).is_empty()
     }

@@ -1,7 +1,8 @@
 //! Landmarks: matches that are given, kept exactly, and pull the rest of the map.
 //!
-//! Around a landmark heat spreads as far on both shapes. How warm a vertex is from each landmark, at a few times, is set beside its
-//! descriptors in the functional map's system, and beside its row in the embedding in every round of refinement.
+//! Around a landmark heat spreads as far on both shapes. How warm a vertex is from each landmark, at a few times, is
+//! set beside its descriptors in the functional map's system, and beside its row in the embedding in every round of
+//! refinement.
 
 use super::pair::Pair;
 use crate::Matrix;

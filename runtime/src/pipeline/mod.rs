@@ -61,11 +61,11 @@ const _: () = assert!(
 /// The result for a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Match {
-    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source, and its point on the target's surface;
-    /// vertices of no face are unmatched. The confidence is what [`crate::quality::doubt`] leaves.
+    /// Target vertex of each source vertex, in the inputs' vertices, `[n_input]` of the source, and its point on the
+    /// target's surface; vertices of no face are unmatched. The confidence is what [`crate::quality::doubt`] leaves.
     pub map: PointMap,
-    /// The functional map of the working meshes, `[k, k]` (target x source), before refinement; between bases at unit area
-    /// ([`Shape::unit_basis`]).
+    /// The functional map of the working meshes, `[k, k]` (target x source), before refinement; between bases at unit
+    /// area ([`Shape::unit_basis`]).
     pub functional_map: Matrix,
     /// How its solution went.
     pub functional_map_info: FmapInfo,
@@ -107,8 +107,8 @@ impl Matcher {
     /// Loads the model and settles every option.
     ///
     /// # Errors
-    /// If the model cannot be read or breaks its contract, this build lacks the back-end, or the cache's folder cannot be
-    /// made.
+    /// If the model cannot be read or breaks its contract, this build lacks the back-end, or the cache's folder
+    /// cannot be made.
     pub fn new(options: &MatchOptions) -> Result<Self, Error> {
         let network = match (options.descriptor, &options.model) {
             (DescriptorKind::Learned, ModelSource::File(path)) => {
@@ -127,7 +127,8 @@ impl Matcher {
         let default_decimate = metadata.map_or(ShapeOptions::default().decimate, |m| m.decimate);
         let solver = metadata.map_or(FmapSolver::LeastSquares, |m| m.solver.for_matching());
         let k = options.k.unwrap_or_else(|| metadata.map_or(SHOT_K, |m| m.k));
-        // Subdivided meshes would not be triangulated alike, nor would a bijection of theirs be one of the inputs' vertices.
+        // Subdivided meshes would not be triangulated alike, nor would a bijection of theirs be one of the inputs'
+        // vertices.
         let one_to_one =
             matches!(options.refinement, Some(Refinement::Pmf | Refinement::SharedTriangulation));
         let by_default = if network.is_some() { None } else { Some(Refinement::None) };
@@ -231,15 +232,15 @@ impl Matcher {
     /// Processes a shape and computes its descriptors; `name` is for messages.
     ///
     /// # Errors
-    /// If the mesh has no surface left after repair, is too small for `k` eigenfunctions or too large for the memory, if the
-    /// radius is out of range, the network fails, or the cache cannot be written; it names the shape.
+    /// If the mesh has no surface left after repair, is too small for `k` eigenfunctions or too large for the memory,
+    /// if the radius is out of range, the network fails, or the cache cannot be written; it names the shape.
     pub fn describe(&self, name: &str, mesh: &Mesh, observer: Observer) -> Result<DescribedShape, Error> {
         self.describe_by(&self.shape_options, name, mesh, observer)
     }
 
     /// As [`Matcher::describe`], for a part of a shape in the unit of the whole: `whole_area` is the area of that, in
-    /// squared units of the mesh, above 0. A part may be the source of a map to the whole, in whatever pose, and is matched
-    /// as a part.
+    /// squared units of the mesh, above 0. A part may be the source of a map to the whole, in whatever pose, and is
+    /// matched as a part.
     ///
     /// # Errors
     /// As [`Matcher::describe`], and if `whole_area` is out of range or the refinement is for whole shapes only.
@@ -293,9 +294,9 @@ impl Matcher {
     /// described as one.
     ///
     /// # Errors
-    /// If the target is a part, a shape was described by another model or other settings, the descriptors are not finite, a shape
-    /// has too few eigenfunctions, a stage would take more memory than there is, the refinement fails, or the matches are too few to
-    /// be upscaled; it names the shape or the pair.
+    /// If the target is a part, a shape was described by another model or other settings, the descriptors are not
+    /// finite, a shape has too few eigenfunctions, a stage would take more memory than there is, the refinement
+    /// fails, or the matches are too few to be upscaled; it names the shape or the pair.
     pub fn match_shapes(
         &self,
         source: &DescribedShape,
@@ -305,8 +306,9 @@ impl Matcher {
         self.match_with_landmarks(source, target, &[], observer)
     }
 
-    /// As [`Matcher::match_shapes`], with matches that are known: pairs of a vertex of the source's input and one of the target's. They are
-    /// kept exactly, and pull the rest of the map: in the functional map's system, and in refinement by the wavelet filter.
+    /// As [`Matcher::match_shapes`], with matches that are known: pairs of a vertex of the source's input and one of
+    /// the target's. They are kept exactly, and pull the rest of the map: in the functional map's system, and in
+    /// refinement by the wavelet filter.
     ///
     /// # Errors
     /// As [`Matcher::match_shapes`], and if a vertex does not exist or is on no surface.

@@ -34,10 +34,11 @@ pub enum Refinement {
     /// ZoomOut (Melzi et al. 2019).
     #[default]
     Zoomout,
-    /// The wavelet filter, coarse to fine (Hu, Li, Liu et al. 2021): in both directions, of a part in that to its whole.
+    /// The wavelet filter, coarse to fine (Hu, Li, Liu et al. 2021): in both directions, of a part in that to its
+    /// whole.
     Wavelet,
-    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one between
-    /// meshes of equally many vertices, injective where the source has fewer.
+    /// ZoomOut, then the product manifold filter (Vestner et al. 2017) with SHOT, which takes longer: one-to-one
+    /// between meshes of equally many vertices, injective where the source has fewer.
     #[serde(alias = "pmf-geometry")]
     #[cfg_attr(feature = "cli", value(alias = "pmf-geometry"))]
     Pmf,
@@ -47,7 +48,8 @@ pub enum Refinement {
 }
 
 impl Refinement {
-    /// What suits the maps of a solver: the wavelet filter for those of both directions or of a part, ZoomOut for others.
+    /// What suits the maps of a solver: the wavelet filter for those of both directions or of a part, ZoomOut for
+    /// others.
     pub fn suiting(solver: FmapSolver) -> Self {
         match solver {
             FmapSolver::Joint { .. } | FmapSolver::Part { .. } => Self::Wavelet,
@@ -70,8 +72,8 @@ impl Refinement {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Upscaling {
-    /// Along the surface: a vertex of the full source goes where its place on the decimated one goes. Maps that come from no
-    /// functional map, those of the product manifold filter, take the l2,1 problem instead.
+    /// Along the surface: a vertex of the full source goes where its place on the decimated one goes. Maps that come
+    /// from no functional map, those of the product manifold filter, take the l2,1 problem instead.
     #[default]
     Surface,
     /// The robust l2,1 problem of the paper.
@@ -145,18 +147,19 @@ pub struct MatchOptions {
     pub model: ModelSource,
     /// What computes the network. Default: tract.
     pub backend: Backend,
-    /// Number of eigenfunctions of the functional map, from 1 to what [`crate::spectral::eigenbasis`] gives of the working meshes. Default:
-    /// the model's; 120 for SHOT.
+    /// Number of eigenfunctions of the functional map, from 1 to what [`crate::spectral::eigenbasis`] gives of the
+    /// working meshes. Default: the model's; 120 for SHOT.
     pub k: Option<usize>,
-    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for SHOT;
-    /// [`FmapSolver::Part`] for a part and its whole.
+    /// Solver of the functional map. Default: what suits the model, [`FmapSolver::for_matching`]; least squares for
+    /// SHOT; [`FmapSolver::Part`] for a part and its whole.
     pub solver: Option<FmapSolver>,
-    /// SHOT radius relative to sqrt(area), above 0. Default: the model's; that of [`crate::descriptor::ShotOptions`] for SHOT.
+    /// SHOT radius relative to sqrt(area), above 0. Default: the model's; that of [`crate::descriptor::ShotOptions`]
+    /// for SHOT.
     pub shot_radius: Option<f64>,
     /// Meshes of more vertices are decimated to so many, 4 or more. Default: the model's; 15000 for SHOT.
     pub decimate: Resize,
-    /// Meshes of fewer vertices are subdivided to so many. Default: 2000; never where the refinement is the product manifold
-    /// filter, whose map is one of the vertices that there are.
+    /// Meshes of fewer vertices are subdivided to so many. Default: 2000; never where the refinement is the product
+    /// manifold filter, whose map is one of the vertices that there are.
     pub subdivide: Resize,
     /// Refinement. Default: what suits the solver, [`Refinement::suiting`]; none for SHOT.
     pub refinement: Option<Refinement>,
@@ -164,8 +167,8 @@ pub struct MatchOptions {
     pub upscaling: Upscaling,
     /// How much is tried to find a good map. Default: other ways where the first map is doubtful.
     pub effort: Effort,
-    /// Steps by which the network is adapted to the pair, 0 for none. Default: 10 where the first map is doubtful, else none. Only for
-    /// models that [`crate::network::DescriptorNetwork::native`] knows.
+    /// Steps by which the network is adapted to the pair, 0 for none. Default: 10 where the first map is doubtful,
+    /// else none. Only for models that [`crate::network::DescriptorNetwork::native`] knows.
     pub adapt: Option<usize>,
     /// Folder of results kept for each shape; `None`, the default: nothing is kept.
     pub cache: Option<PathBuf>,

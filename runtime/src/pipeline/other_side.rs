@@ -1,7 +1,8 @@
-//! Limbs that are exchanged, left and right: what a map tears off and sends elsewhere is tried on the other side of the target.
+//! Limbs that are exchanged, left and right: what a map tears off and sends elsewhere is tried on the other side of
+//! the target.
 //!
-//! Where the other side is comes from the map of the target to its own mirror image: both have the same distances, and the
-//! descriptors tell left from right by the orientation of the surface.
+//! Where the other side is comes from the map of the target to its own mirror image: both have the same distances,
+//! and the descriptors tell left from right by the orientation of the surface.
 
 use super::DescribedShape;
 use super::Refinement;
@@ -42,7 +43,8 @@ impl Pair<'_> {
         Ok(())
     }
 
-    /// The start from a map and the one back with a region on the other side; descriptors beside it tell front from back there.
+    /// The start from a map and the one back with a region on the other side; descriptors beside it tell front from
+    /// back there.
     fn exchanged(
         &self,
         (map, back): (&PointMap, Option<&PointMap>),

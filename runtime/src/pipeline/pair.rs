@@ -16,8 +16,8 @@ use crate::shape::Context;
 use crate::spectral::Eigenbasis;
 use std::sync::OnceLock;
 
-/// Length of the descriptors beside the rows of refinement's embeddings, whose squared length is about 400: on people and animals of
-/// other makers 7 to 14 give the same, 0 and 20 are worse.
+/// Length of the descriptors beside the rows of refinement's embeddings, whose squared length is about 400: on people
+/// and animals of other makers 7 to 14 give the same, 0 and 20 are worse.
 const DESCRIPTORS_BESIDE: f64 = 10.0;
 
 /// A part of so large a share of the whole is in another unit of length, or no part.
@@ -200,8 +200,8 @@ impl Pair<'_> {
             && matches!(self.matcher.solver(self.is_part()), FmapSolver::Joint { .. })
     }
 
-    /// What counts beside the embeddings of refinement: descriptors, where a model was trained to tell vertices by them, and
-    /// landmarks.
+    /// What counts beside the embeddings of refinement: descriptors, where a model was trained to tell vertices by
+    /// them, and landmarks.
     pub(super) fn anchors(
         &self,
         descriptors: Option<[&Matrix<f32>; 2]>,
@@ -240,7 +240,8 @@ impl Pair<'_> {
     }
 }
 
-/// The embedding of functional maps, with columns of the landmarks beside it; `rows` are the vertices that the bases are at.
+/// The embedding of functional maps, with columns of the landmarks beside it; `rows` are the vertices that the bases
+/// are at.
 fn compared(
     maps: &BothMaps,
     comparison: Comparison,

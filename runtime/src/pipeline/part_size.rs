@@ -1,5 +1,5 @@
-//! Other sizes of a part, tried where its map is doubtful: parts of one shape are often matched to the whole of a larger or smaller one,
-//! or come in another unit of length.
+//! Other sizes of a part, tried where its map is doubtful: parts of one shape are often matched to the whole of a
+//! larger or smaller one, or come in another unit of length.
 
 use super::DescribedShape;
 use super::candidates::Tried;
@@ -16,8 +16,8 @@ const STEP: f64 = std::f64::consts::SQRT_2;
 /// Steps to larger and to smaller sizes.
 const STEPS: i32 = 3;
 
-/// A map at another size is taken if its expected error is below this share of the one so far. Between unlike bodies four right sizes
-/// came to 0.19 to 0.74 of that at the part's own.
+/// A map at another size is taken if its expected error is below this share of the one so far. Between unlike bodies
+/// four right sizes came to 0.19 to 0.74 of that at the part's own.
 const CLEARLY: f64 = 0.75;
 
 impl Pair<'_> {
@@ -60,7 +60,8 @@ impl Pair<'_> {
         Ok((found, judged))
     }
 
-    /// The source as if its area were so many times as large. Nothing of that is kept on disk: few would ask for it again.
+    /// The source as if its area were so many times as large. Nothing of that is kept on disk: few would ask for it
+    /// again.
     fn resized(&self, times: f64) -> Result<DescribedShape, Error> {
         let shape = self.source.shape.part_of(self.source.shape.unit_area() / times);
         let descriptors =

@@ -9,22 +9,24 @@ use crate::Matrix;
 use crate::spectral::Eigenbasis;
 use rayon::prelude::*;
 
-/// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows slower.
+/// Source rows times target rows up to which one product of both takes less time than two searches, whose cost grows
+/// slower.
 const MOST_PRODUCTS: usize = 1 << 28;
 
 /// Both shapes in the space in which a functional map compares their vertices, a row for each.
 ///
-/// By [`Comparison::Joint`] it is the space of the coefficients of both, `k_target + k_source` wide: the row of a source vertex
-/// `x` is `[C12 phi(x), phi(x)]`, that of a target vertex `y` is `[psi(y), C21 psi(y)]`. A distance in it is what the two
-/// functional maps miss together, `|C12 phi(x) - psi(y)|^2 + |phi(x) - C21 psi(y)|^2`; it is the same from either side, so that
-/// one embedding gives the point maps of both directions.
+/// By [`Comparison::Joint`] it is the space of the coefficients of both, `k_target + k_source` wide: the row of a
+/// source vertex `x` is `[C12 phi(x), phi(x)]`, that of a target vertex `y` is `[psi(y), C21 psi(y)]`. A distance in
+/// it is what the two functional maps miss together, `|C12 phi(x) - psi(y)|^2 + |phi(x) - C21 psi(y)|^2`; it is the
+/// same from either side, so that one embedding gives the point maps of both directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedding<T = f64> {
     /// The rows of the source, `[n_source, d]`; joint: `[Phi C12^T, Phi]`.
     pub source: Matrix<T>,
     /// The rows of the target, `[n_target, d]`; joint: `[Psi, Psi C21^T]`.
     pub target: Matrix<T>,
-    /// Joint: `Phi (C12^T + C21)`, `[n_source, k_target]`, and `Psi`, whose products are those of the rows in half the width.
+    /// Joint: `Phi (C12^T + C21)`, `[n_source, k_target]`, and `Psi`, whose products are those of the rows in half
+    /// the width.
     factors: Option<[Matrix<T>; 2]>,
 }
 
@@ -79,8 +81,8 @@ impl Embedding<f64> {
         Ok(Self { factors: Some([phi, basis_target.eigenvectors.clone()]), ..rows })
     }
 
-    /// As [`Embedding::joint`], with further columns beside the rows, `[n_source, a]` and `[n_target, a]`; for its rows, as it is
-    /// searched in twice the width.
+    /// As [`Embedding::joint`], with further columns beside the rows, `[n_source, a]` and `[n_target, a]`; for its
+    /// rows, as it is searched in twice the width.
     ///
     /// # Errors
     /// If a map is not of that shape.
@@ -124,7 +126,8 @@ impl Embedding<f64> {
         Ok(Self { source, target, factors: None })
     }
 
-    /// The same with further columns beside the rows, `[n_source, a]` and `[n_target, a]`, which count in every distance.
+    /// The same with further columns beside the rows, `[n_source, a]` and `[n_target, a]`, which count in every
+    /// distance.
     ///
     /// # Panics
     /// If they have not as many rows.
@@ -135,8 +138,8 @@ impl Embedding<f64> {
         Self { source: beside(&self.source, source), target: beside(&self.target, target), factors }
     }
 
-    /// For each source vertex the nearest target vertex, the lowest of several; the confidence is the cosine of the angle
-    /// between their rows, negative ones as 0.
+    /// For each source vertex the nearest target vertex, the lowest of several; the confidence is the cosine of the
+    /// angle between their rows, negative ones as 0.
     ///
     /// # Errors
     /// If an entry is not finite, or there are no target vertices.
@@ -153,8 +156,8 @@ impl Embedding<f64> {
     }
 
     /// The point maps of both directions, source to target first, as [`Embedding::forth`] and [`Embedding::back`] but
-    /// between small shapes in single precision, which takes a fraction of the time: distances that agree to six digits may be
-    /// taken for one another.
+    /// between small shapes in single precision, which takes a fraction of the time: distances that agree to six
+    /// digits may be taken for one another.
     ///
     /// # Errors
     /// If an entry is not finite, or a shape has no vertices.

@@ -1,8 +1,8 @@
-//! Precise maps: points on the target's surface rather than its vertices (Ezuz and Ben-Chen 2017, "Deblurring and denoising of
-//! maps between shapes").
+//! Precise maps: points on the target's surface rather than its vertices (Ezuz and Ben-Chen 2017, "Deblurring and
+//! denoising of maps between shapes").
 //!
-//! The target's triangles are triangles in the embedding too. The image of a source point is the point of them that is nearest
-//! to its row. It lies on a triangle near the nearest vertex, so that only those are tried.
+//! The target's triangles are triangles in the embedding too. The image of a source point is the point of them that
+//! is nearest to its row. It lies on a triangle near the nearest vertex, so that only those are tried.
 
 use super::search::squared_distance_single;
 use crate::Matrix;
@@ -54,8 +54,9 @@ impl<'a> EmbeddedSurface<'a> {
         Self { mesh, rows, first, around, sides }
     }
 
-    /// The nearest point to `row`, `[d]`, that can be reached downhill: over vertices from one of `starts`, then over triangles, of which
-    /// all around the corners that the nearest point so far is between are tried. None where no triangle is there.
+    /// The nearest point to `row`, `[d]`, that can be reached downhill: over vertices from one of `starts`, then over
+    /// triangles, of which all around the corners that the nearest point so far is between are tried. None where no
+    /// triangle is there.
     ///
     /// # Panics
     /// If there is no such vertex, or the row has not `d` entries.
@@ -153,8 +154,8 @@ impl Distances<'_> {
     }
 }
 
-/// The weights of the point of a triangle that is nearest to a point, in a space of any dimension: from the squared distances
-/// to the corners and the squared lengths of the sides opposite them.
+/// The weights of the point of a triangle that is nearest to a point, in a space of any dimension: from the squared
+/// distances to the corners and the squared lengths of the sides opposite them.
 ///
 /// The triangle is laid into the plane with its first corner at the origin and its second on an axis.
 fn weights_of_nearest([da, db, dc]: [f64; 3], [bc, ca, ab]: [f64; 3]) -> [f64; 3] {

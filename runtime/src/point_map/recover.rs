@@ -18,13 +18,13 @@ pub enum Comparison {
     /// The distance `|C phi(x) - psi(y)|` on the target (Ovsjanikov et al. 2012), as in the paper.
     #[default]
     Distance,
-    /// The distance `|phi(x) - C^T psi(y)|` on the source, by the adjoint functional map, as in ZoomOut. A map that is
-    /// blurred shortens what it transports, and a shortened query is drawn to short rows of `psi`; here the rows themselves
-    /// are shortened, the query keeps its length. On FAUST pairs the mean error of the raw bidirectional maps is 1.1 instead
-    /// of 1.3.
+    /// The distance `|phi(x) - C^T psi(y)|` on the source, by the adjoint functional map, as in ZoomOut. A map that
+    /// is blurred shortens what it transports, and a shortened query is drawn to short rows of `psi`; here the rows
+    /// themselves are shortened, the query keeps its length. On FAUST pairs the mean error of the raw bidirectional
+    /// maps is 1.1 instead of 1.3.
     Adjoint,
-    /// The sum of both squares, in the [`super::Embedding`] of the functional maps of both directions; of one map, with its
-    /// adjoint as the other.
+    /// The sum of both squares, in the [`super::Embedding`] of the functional maps of both directions; of one map,
+    /// with its adjoint as the other.
     Joint,
 }
 

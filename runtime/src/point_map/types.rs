@@ -9,11 +9,11 @@ pub struct PointMap {
     pub targets: Vec<u32>,
     /// How far each match can be trusted, `[n_source]`, from 0 to 1; `None` where that is not known.
     pub confidence: Option<Vec<f32>>,
-    /// The point on the target's surface that each source vertex goes to, `[n_source]`, finer than its vertex; none where a vertex
-    /// has no match. `None` where the map is not known finer than to a vertex.
+    /// The point on the target's surface that each source vertex goes to, `[n_source]`, finer than its vertex; none
+    /// where a vertex has no match. `None` where the map is not known finer than to a vertex.
     pub points: Option<Vec<Option<SurfacePoint>>>,
-    /// Source vertices, ascending, that repair left out, of small pieces and of faces without area: each has the match of the nearest
-    /// vertex that it kept.
+    /// Source vertices, ascending, that repair left out, of small pieces and of faces without area: each has the
+    /// match of the nearest vertex that it kept.
     pub followers: Vec<u32>,
     /// Number of target vertices.
     pub n_target: usize,

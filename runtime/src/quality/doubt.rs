@@ -10,8 +10,9 @@ const STEPS: usize = 8;
 /// A way there and back that misses by so much, relative to sqrt(area), is certainly wrong.
 const FAR: f64 = 0.2;
 
-/// The doubt of every vertex of the source, `[n]`, from 0 to 1: from the share of reversed triangles and torn edges around it, and
-/// from how far it comes back from itself, averaged over its surroundings. Vertices without a match have doubt 1.
+/// The doubt of every vertex of the source, `[n]`, from 0 to 1: from the share of reversed triangles and torn edges
+/// around it, and from how far it comes back from itself, averaged over its surroundings. Vertices without a match
+/// have doubt 1.
 ///
 /// # Panics
 /// If a map is not one of these shapes, which [`Quality::measure`](super::Quality::measure) finds out.

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// How measures of a map become an estimate of its error; fitted on maps with known errors, in the model's metadata.
 ///
-/// Both are linear in `log(measure + a small number)` of each measure: the logarithm of the expected mean error, and the log-odds that it is above 0.1 sqrt(area).
+/// Both are linear in `log(measure + a small number)` of each measure: the logarithm of the expected mean error, and
+/// the log-odds that it is above 0.1 sqrt(area).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -30,7 +31,8 @@ pub struct Estimate {
 }
 
 impl Default for Calibration {
-    /// Fitted on 715 maps, 115 of them bad, of several models and refinements between people and animals of four makers.
+    /// Fitted on 715 maps, 115 of them bad, of several models and refinements between people and animals of four
+    /// makers.
     fn default() -> Self {
         Self {
             error: [3.722, 0.178, 0.090, 0.221, 0.191, 0.150],
@@ -41,9 +43,10 @@ impl Default for Calibration {
 }
 
 impl Calibration {
-    /// That of maps of parts to their wholes, whose measures are worse for being parts: fitted on 560 maps, 390 of them bad, by four models,
-    /// of synthetic people, bipeds and quadrupeds cut in pieces onto others of their kind, of the same size and of another. The odds follow
-    /// the expected error: weights of their own for each measure told these parts apart a little better, but not those of a real dog.
+    /// That of maps of parts to their wholes, whose measures are worse for being parts: fitted on 560 maps, 390 of
+    /// them bad, by four models, of synthetic people, bipeds and quadrupeds cut in pieces onto others of their kind,
+    /// of the same size and of another. The odds follow the expected error: weights of their own for each measure
+    /// told these parts apart a little better, but not those of a real dog.
     pub fn of_parts() -> Self {
         Self {
             error: [4.594, 0.605, 0.095, 0.080, 0.108, 0.415],
@@ -55,7 +58,8 @@ impl Calibration {
     /// A constant and a weight for each measure.
     pub const WIDTH: usize = 6;
 
-    /// The features that the weights are for: 1 and the logarithms of commutativity, Dirichlet energy, orthogonality, stretched and reversed share.
+    /// The features that the weights are for: 1 and the logarithms of commutativity, Dirichlet energy, orthogonality,
+    /// stretched and reversed share.
     pub fn features(quality: &Quality) -> [f64; Self::WIDTH] {
         let log = |value: f64, floor: f64| (value.max(0.0) + floor).ln();
         [

@@ -1,9 +1,9 @@
 //! How good a map is, told without ground truth.
 //!
-//! A right map between deformable shapes nearly commutes with their Laplacians, takes neighbours to neighbours, and keeps the
-//! orientation of the surface. [`Quality`] measures how far a map is from that as a whole, [`doubt`] at every vertex;
-//! [`Calibration`] turns the measures into an estimate of the error. All measures are of the working meshes, where the map is
-//! found, and do not depend on scale, position or pose.
+//! A right map between deformable shapes nearly commutes with their Laplacians, takes neighbours to neighbours, and
+//! keeps the orientation of the surface. [`Quality`] measures how far a map is from that as a whole, [`doubt`] at
+//! every vertex; [`Calibration`] turns the measures into an estimate of the error. All measures are of the working
+//! meshes, where the map is found, and do not depend on scale, position or pose.
 
 mod doubt;
 mod estimate;
@@ -50,11 +50,11 @@ pub struct Quality {
     pub dirichlet: f64,
     /// Share of the source's edges that are stretched more than five times, or that tear between pieces.
     pub stretched: f64,
-    /// Share of the source's area whose orientation the map reverses, of the area where it has one: about 0.04 for a right map, 0.95 for a
-    /// mirrored one.
+    /// Share of the source's area whose orientation the map reverses, of the area where it has one: about 0.04 for a
+    /// right map, 0.95 for a mirrored one.
     pub reversed: f64,
-    /// Mean distance from a vertex to where the map there and back takes it, relative to sqrt(area); none where the map back is not
-    /// known.
+    /// Mean distance from a vertex to where the map there and back takes it, relative to sqrt(area); none where the
+    /// map back is not known.
     pub cycle: Option<f64>,
     /// Share of the target's area that is matched.
     pub coverage: f64,

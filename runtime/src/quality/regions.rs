@@ -1,4 +1,5 @@
-//! Regions that a map has sent to the wrong place as a whole, as where limbs are exchanged: what it tears off, and maps that are inside out.
+//! Regions that a map has sent to the wrong place as a whole, as where limbs are exchanged: what it tears off, and
+//! maps that are inside out.
 
 use super::Side;
 use super::doubt::{averaged, reversed_share};
@@ -11,15 +12,17 @@ use std::collections::BTreeMap;
 const LEAST: f64 = 0.03;
 /// A vertex is turned inside out where so large a share of the triangles around it is reversed.
 const REVERSED: f64 = 0.5;
-/// A tear is of edges that become so many times longer: where it crosses a limb refinement has smoothed it over a few edges.
+/// A tear is of edges that become so many times longer: where it crosses a limb refinement has smoothed it over a few
+/// edges.
 const CUT: f64 = 2.5;
-/// At a quarter of the edges on the border of a region that is elsewhere the surface tears so far apart, relative to sqrt(area): 0.19
-/// to 0.30 at exchanged limbs, up to 0.11 at regions of good maps, but for a foal's short tail on a lion's long one.
+/// At a quarter of the edges on the border of a region that is elsewhere the surface tears so far apart, relative to
+/// sqrt(area): 0.19 to 0.30 at exchanged limbs, up to 0.11 at regions of good maps, but for a foal's short tail on a
+/// lion's long one.
 const JUMP: f64 = 0.12;
 
-/// The regions of the source that the map has torn off from the rest and sent elsewhere, the largest first: the vertices of each,
-/// ascending. A region is connected, has 3 % of the area or more and the same orientation on the target throughout. The largest
-/// one of all counts only if it is turned inside out: the map then is mirrored.
+/// The regions of the source that the map has torn off from the rest and sent elsewhere, the largest first: the
+/// vertices of each, ascending. A region is connected, has 3 % of the area or more and the same orientation on the
+/// target throughout. The largest one of all counts only if it is turned inside out: the map then is mirrored.
 ///
 /// # Panics
 /// If the map is not one of these shapes, which [`Quality::measure`](super::Quality::measure) finds out.
@@ -28,7 +31,8 @@ pub fn displaced_regions(map: &PointMap, source: Side, target: Side) -> Vec<Vec<
     let is_reversed = |v: u32| reversed[v as usize] > REVERSED;
     let mut sets = UnionFind::new(map.len());
     let mut border = Vec::new();
-    // Where a limb is reversed its border is an edge or two beside the tear; so a border edge has the longest tear next to it.
+    // Where a limb is reversed its border is an edge or two beside the tear; so a border edge has the longest tear
+    // next to it.
     let mut tear = vec![0.0f64; map.len()];
     for &edge in &source.frame.edges {
         let Some(stretch) = stretch(map, edge, source, target) else { continue };

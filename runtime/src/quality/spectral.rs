@@ -23,8 +23,8 @@ pub(super) fn measure(
     Ok(Spectral { commutativity, orthogonality: orthogonality(&c) })
 }
 
-/// `sum (mu_i - lambda_j)^2 C_ij^2 / sum (mu_i^2 + lambda_j^2) C_ij^2` of `C`, `[k_target, k_source]`; 1 for a `C` without entries
-/// beyond the constants.
+/// `sum (mu_i - lambda_j)^2 C_ij^2 / sum (mu_i^2 + lambda_j^2) C_ij^2` of `C`, `[k_target, k_source]`; 1 for a `C`
+/// without entries beyond the constants.
 fn commutativity(c: &Matrix, lambda: &[f64], mu: &[f64]) -> f64 {
     let (mut apart, mut whole) = (0.0, 0.0);
     for (i, mu) in mu.iter().enumerate() {

@@ -80,8 +80,8 @@ fn dirichlet(map: &PointMap, source: Side, target: Side) -> f64 {
     (0..map.len()).map(of_row).sum::<f64>() * squared
 }
 
-/// How many times longer an edge of the source becomes, both shapes at unit area; none without matches at both ends, or for an edge
-/// without length.
+/// How many times longer an edge of the source becomes, both shapes at unit area; none without matches at both ends,
+/// or for an edge without length.
 pub(super) fn stretch(map: &PointMap, [i, j]: [u32; 2], source: Side, target: Side) -> Option<f64> {
     let at = |side: Side, v: u32| side.mesh.vertices()[v as usize];
     let before = vec3::distance(at(source, i), at(source, j)) / source.frame.unit;
@@ -90,7 +90,8 @@ pub(super) fn stretch(map: &PointMap, [i, j]: [u32; 2], source: Side, target: Si
     (before > 0.0).then(|| after / before)
 }
 
-/// Whether a triangle of the source is the same way round on the target; none where its corners do not span a triangle there.
+/// Whether a triangle of the source is the same way round on the target; none where its corners do not span a
+/// triangle there.
 pub(super) fn keeps_orientation(map: &PointMap, face: usize, source: Side, target: Side) -> Option<bool> {
     let mut corners = [0u32; 3];
     for (corner, &v) in corners.iter_mut().zip(&source.mesh.faces()[face]) {

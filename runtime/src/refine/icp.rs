@@ -26,8 +26,8 @@ impl Default for IcpOptions {
 pub struct IcpInfo {
     /// Whether the matches stopped changing.
     pub converged: bool,
-    /// Root of the area-weighted mean over the source of `|C phi(x) - psi(T(x))|^2` at the start of each round and at the
-    /// end; it never increases from the second on.
+    /// Root of the area-weighted mean over the source of `|C phi(x) - psi(T(x))|^2` at the start of each round and at
+    /// the end; it never increases from the second on.
     pub residuals: Vec<f64>,
 }
 
@@ -35,9 +35,9 @@ pub struct IcpInfo {
 /// has fewer) that explains its own point map.
 ///
 /// Each round finds for every source vertex the nearest target row to `C phi(x)`, and then the orthonormal `C` that
-/// minimises `sum_x A_x |C phi(x) - psi(T(x))|^2`: with the singular value decomposition `Psi[T]^T A Phi = U S V^T`, it is
-/// `U V^T`. An orthonormal functional map between bases at unit area preserves areas, which holds for nearly isometric
-/// shapes; for others prefer ZoomOut.
+/// minimises `sum_x A_x |C phi(x) - psi(T(x))|^2`: with the singular value decomposition `Psi[T]^T A Phi = U S V^T`,
+/// it is `U V^T`. An orthonormal functional map between bases at unit area preserves areas, which holds for nearly
+/// isometric shapes; for others prefer ZoomOut.
 ///
 /// # Errors
 /// If `c` is not of that shape, an option is out of range, or an entry of a basis is not finite.

@@ -111,8 +111,8 @@ fn check_bases(basis_source: &Eigenbasis, basis_target: &Eigenbasis) -> Result<(
     }
 }
 
-/// The embedding of a functional map, `[k_target, k_source]`, and its adjoint, in as many eigenfunctions of each shape, of which a part has
-/// fewer; with columns beside the rows, where there are any.
+/// The embedding of a functional map, `[k_target, k_source]`, and its adjoint, in as many eigenfunctions of each
+/// shape, of which a part has fewer; with columns beside the rows, where there are any.
 pub(crate) fn adjoint_embedding(
     c: &Matrix,
     basis_source: &Eigenbasis,
@@ -127,8 +127,8 @@ pub(crate) fn adjoint_embedding(
     })
 }
 
-/// How many eigenfunctions of a part belong to `k` of its whole: as many fewer as its area is smaller, as its eigenvalues are spaced the
-/// wider. Bases in one unit.
+/// How many eigenfunctions of a part belong to `k` of its whole: as many fewer as its area is smaller, as its
+/// eigenvalues are spaced the wider. Bases in one unit.
 fn eigenfunctions_of_part(k: usize, part: &Eigenbasis, whole: &Eigenbasis) -> usize {
     ((k as f64 * part.area() / whole.area()).round() as usize).clamp(1, k)
 }

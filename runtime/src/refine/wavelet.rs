@@ -1,9 +1,10 @@
-//! Wavelet refinement (Hu, Li, Liu et al. 2021, "Efficient deformable shape correspondence via multiscale spectral manifold
-//! wavelets preservation").
+//! Wavelet refinement (Hu, Li, Liu et al. 2021, "Efficient deformable shape correspondence via multiscale spectral
+//! manifold wavelets preservation").
 //!
-//! A map that preserves distances takes wavelets to wavelets, at every scale. Each round asks that of a functional map `C`:
-//! with the filters `g_s` of all scales, `C~ = sum_s g_s(mu) C g_s(lambda)` entry by entry, see [`bands`]. Entries between
-//! functions of unlike frequency fade, the more the farther apart they are, and with them what a wrong match brings in.
+//! A map that preserves distances takes wavelets to wavelets, at every scale. Each round asks that of a functional
+//! map `C`: with the filters `g_s` of all scales, `C~ = sum_s g_s(mu) C g_s(lambda)` entry by entry, see [`bands`].
+//! Entries between functions of unlike frequency fade, the more the farther apart they are, and with them what a
+//! wrong match brings in.
 
 mod bands;
 mod by_samples;
@@ -42,11 +43,12 @@ pub struct WaveletOptions {
 /// What else is known of a pair.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WaveletHints<'a> {
-    /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance: descriptors, or
-    /// landmarks.
+    /// Columns beside the embedding's rows, of source and target, `[n, a]` each, which count in every distance:
+    /// descriptors, or landmarks.
     pub anchors: Option<&'a [Matrix; 2]>,
-    /// The meshes that the bases are of, source and target. With them, if they have many vertices, rounds match samples only, five for each
-    /// eigenfunction and 1000 or more, and the last round all vertices, along the edges. Without them, rounds search through all vertices.
+    /// The meshes that the bases are of, source and target. With them, if they have many vertices, rounds match
+    /// samples only, five for each eigenfunction and 1000 or more, and the last round all vertices, along the edges.
+    /// Without them, rounds search through all vertices.
     pub meshes: Option<[&'a Mesh; 2]>,
 }
 
@@ -63,8 +65,8 @@ impl Default for WaveletOptions {
 }
 
 impl WaveletOptions {
-    /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 3 rounds at 60, 2 at 128, 3 at 200. For a start of
-    /// which the rough is right; what it has of details the descriptors beside the embedding keep.
+    /// From 60 eigenfunctions, or `k_start` if that is fewer, up to `k_max`: 3 rounds at 60, 2 at 128, 3 at 200. For
+    /// a start of which the rough is right; what it has of details the descriptors beside the embedding keep.
     pub fn coarse_to_fine(k_start: usize, k_max: usize) -> Self {
         let mut stages: Vec<WaveletStage> =
             COARSE_TO_FINE.into_iter().filter(|stage| stage.k < k_max).collect();
@@ -99,16 +101,17 @@ pub struct RefinedBoth<Info> {
     pub info: Info,
 }
 
-/// Refines the point maps of both directions between whole shapes, `[source to target, target to source]`, by alternating between them and their
-/// filtered functional maps while the number of eigenfunctions grows.
+/// Refines the point maps of both directions between whole shapes, `[source to target, target to source]`, by
+/// alternating between them and their filtered functional maps while the number of eigenfunctions grows.
 ///
 /// A round takes the functional maps that the point maps pull functions back by, `C12 = Psi^T A_target Phi[T21]` and
-/// `C21 = Phi^T A_source Psi[T12]`, filters both, and matches every vertex anew in their [`crate::point_map::Embedding`]. The bases must be
-/// at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a match have one afterwards. The confidence of a match is the
-/// cosine of the angle between the two rows of the embedding.
+/// `C21 = Phi^T A_source Psi[T12]`, filters both, and matches every vertex anew in their
+/// [`crate::point_map::Embedding`]. The bases must be at unit area ([`Eigenbasis::at_unit_area`]). Vertices without a
+/// match have one afterwards. The confidence of a match is the cosine of the angle between the two rows of the
+/// embedding.
 ///
-/// With the meshes, or between small shapes, matches are found in single precision; the functional maps that are returned are in double
-/// precision.
+/// With the meshes, or between small shapes, matches are found in single precision; the functional maps that are
+/// returned are in double precision.
 ///
 /// # Errors
 /// If an option is out of range, a basis has no eigenfunctions, a map, a mesh or the anchors do not fit the
@@ -128,7 +131,8 @@ pub fn wavelet(
     wavelet_along(maps, bases, hints.anchors, edges.as_ref(), options)
 }
 
-/// As [`wavelet()`], where the edges of the meshes are known; of the maps no more is needed than the matches of their samples.
+/// As [`wavelet()`], where the edges of the meshes are known; of the maps no more is needed than the matches of their
+/// samples.
 pub(crate) fn wavelet_along(
     maps: [&PointMap; 2],
     bases: [&Eigenbasis; 2],
@@ -200,8 +204,9 @@ fn filtered(mask: &Matrix, forth: &Matrix, back: &Matrix) -> BothMaps {
     }
 }
 
-/// The functional map by which a point map `T` pulls functions back from the other shape, `[k, k_other]`: `Phi^T A Psi[T]`; where
-/// vertices have no match, the `C` that minimises `sum_x A_x |C^T phi(x) - psi(T(x))|^2` over those that have one.
+/// The functional map by which a point map `T` pulls functions back from the other shape, `[k, k_other]`:
+/// `Phi^T A Psi[T]`; where vertices have no match, the `C` that minimises `sum_x A_x |C^T phi(x) - psi(T(x))|^2` over
+/// those that have one.
 fn pull_back(images: &[u32], basis: &Eigenbasis, other: &Eigenbasis) -> Result<Matrix, RefineError> {
     let known = (0..images.len()).filter(|&x| images[x] != PointMap::UNMATCHED);
     let matched: Vec<u32> = known.map(|x| x as u32).collect();

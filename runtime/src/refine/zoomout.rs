@@ -24,12 +24,12 @@ pub struct ZoomOutOptions {
     pub k_max: usize,
     /// Which vertices take part before the last round. Default [`ZoomOutSamples::All`], to which a part keeps.
     pub samples: ZoomOutSamples,
-    /// Whether each round takes the mean of the functional maps of the point maps in both directions, default true. With
-    /// false it is the paper's method, at half the cost.
+    /// Whether each round takes the mean of the functional maps of the point maps in both directions, default true.
+    /// With false it is the paper's method, at half the cost.
     pub bidirectional: bool,
-    /// Whether the source is a part of the target, with bases in one unit
-    /// ([`Eigenbasis::in_unit`]), default false. It then takes as many fewer eigenfunctions as its area is smaller, as its
-    /// eigenvalues are spaced the wider, and only the map to the target is kept, whatever `bidirectional` says.
+    /// Whether the source is a part of the target, with bases in one unit ([`Eigenbasis::in_unit`]), default false.
+    /// It then takes as many fewer eigenfunctions as its area is smaller, as its eigenvalues are spaced the wider,
+    /// and only the map to the target is kept, whatever `bidirectional` says.
     pub part: bool,
 }
 
@@ -69,21 +69,21 @@ pub struct ZoomOutInfo {
 /// Refines a point map by alternating between it and its functional map while the number of eigenfunctions
 /// `k` grows.
 ///
-/// A round takes the functional map of the point map at `k`, `C = Psi_k[T]^T A Phi_k`, and from it the point
-/// map again: `T(x)` is the `y` for which `C^T psi_k(y)`, the image of the delta function
-/// at `y` under the adjoint, is nearest to `phi_k(x)`. That is the paper's direction: its functional map is `C^T`. Comparing `C
-/// phi(x)` with `psi(y)` on the target instead looks as good but is much worse (mean error 2.4 instead of 1.1
-/// on a pair of FAUST shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short rows of
-/// `Psi`. Source vertices without a match in `map` have one afterwards. The confidence of a match is the cosine
-/// of the angle between `phi(x)` and `C^T psi(y)` in the last round.
+/// A round takes the functional map of the point map at `k`, `C = Psi_k[T]^T A Phi_k`, and from it the point map
+/// again: `T(x)` is the `y` for which `C^T psi_k(y)`, the image of the delta function at `y` under the adjoint, is
+/// nearest to `phi_k(x)`. That is the paper's direction: its functional map is `C^T`. Comparing `C phi(x)` with
+/// `psi(y)` on the target instead looks as good but is much worse (mean error 2.4 instead of 1.1 on a pair of FAUST
+/// shapes): early maps are blurred, and a shortened `C phi(x)` is drawn to short rows of `Psi`. Source vertices
+/// without a match in `map` have one afterwards. The confidence of a match is the cosine of the angle between
+/// `phi(x)` and `C^T psi(y)` in the last round.
 ///
 /// With [`ZoomOutOptions::bidirectional`] the point map from the target to the source is kept as well, and `C` is the
 /// mean of the one above and of the transpose of its counterpart, as between isometric shapes they are one: on
 /// ten pairs of remeshed FAUST shapes a mean error of 1.73 instead of 1.93.
 ///
 /// # Errors
-/// If an option is out of range, a basis has no eigenfunctions, the map does not fit the bases or matches nothing, or an entry
-/// of a basis is not finite.
+/// If an option is out of range, a basis has no eigenfunctions, the map does not fit the bases or matches nothing, or
+/// an entry of a basis is not finite.
 pub fn zoomout(
     map: &PointMap,
     basis_source: &Eigenbasis,

@@ -14,11 +14,12 @@ pub(super) struct Blend {
     pub(super) weights: [f64; 3],
 }
 
-/// For each receiving vertex that shares its donor with a neighbour the place within the giver's triangles where it belongs.
+/// For each receiving vertex that shares its donor with a neighbour the place within the giver's triangles where it
+/// belongs.
 ///
-/// Neighbours that share a donor are steps: the receiver is finer than the giver, or the map blurred. Their places are averaged with
-/// those of the neighbours whose donors are the same or adjacent, a few times, and put back on the surface around the donor. Vertices
-/// with a donor of their own stay where they are, so an exact map is not touched.
+/// Neighbours that share a donor are steps: the receiver is finer than the giver, or the map blurred. Their places
+/// are averaged with those of the neighbours whose donors are the same or adjacent, a few times, and put back on the
+/// surface around the donor. Vertices with a donor of their own stay where they are, so an exact map is not touched.
 pub(super) fn blends(donors: &Donors, receiver: &Mesh, giver: &Mesh) -> Vec<Option<Blend>> {
     let donor: Vec<Option<u32>> = donors.iter().collect();
     let (of_receiver, topology) = (Topology::new(receiver).adjacency(), Topology::new(giver));

@@ -8,8 +8,8 @@ pub const UNMATCHED_COLOR: [u8; 4] = [128, 128, 128, 255];
 
 /// A colour for each vertex that varies smoothly with its position in the bounding box, `[n]` RGBA.
 ///
-/// The longest axis runs from red over green and blue to magenta, the others shade it, so that left and right, front and back
-/// differ.
+/// The longest axis runs from red over green and blue to magenta, the others shade it, so that left and right, front
+/// and back differ.
 pub fn position_colors(mesh: &Mesh) -> Vec<[u8; 4]> {
     let (low, high) = bounds(mesh);
     let extent: Vec<f64> = (0..3).map(|i| high[i] - low[i]).collect();
@@ -21,8 +21,8 @@ pub fn position_colors(mesh: &Mesh) -> Vec<[u8; 4]> {
     mesh.vertices().iter().map(|p| hue(unit(p, axes[0]), unit(p, axes[1]), unit(p, axes[2]))).collect()
 }
 
-/// The colours of the matched vertices, `[n_source]` RGBA; [`UNMATCHED_COLOR`] where there is none among `colors_target`,
-/// `[n_target]`.
+/// The colours of the matched vertices, `[n_source]` RGBA; [`UNMATCHED_COLOR`] where there is none among
+/// `colors_target`, `[n_target]`.
 pub fn map_colors(map: &PointMap, colors_target: &[[u8; 4]]) -> Vec<[u8; 4]> {
     let color = |matched: Option<u32>| colors_target.get(matched? as usize).copied();
     map.iter().map(|matched| color(matched).unwrap_or(UNMATCHED_COLOR)).collect()

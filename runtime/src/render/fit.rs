@@ -13,10 +13,12 @@ const SAME_TURN: f64 = 0.35;
 /// As far apart, in diagonals of the receiver, is the same place.
 const SAME_PLACE: f64 = 0.5;
 
-/// Moves, turns and scales the skeleton as the receiver's vertices lie to those that they take from, where the two meshes are in another
-/// unit, place or orientation; says what was done. Where they are not, the skeleton stays as it is.
+/// Moves, turns and scales the skeleton as the receiver's vertices lie to those that they take from, where the two
+/// meshes are in another unit, place or orientation; says what was done. Where they are not, the skeleton stays as it
+/// is.
 ///
-/// The similarity is that of least squares (Umeyama 1991), its scale the ratio of the spreads, which does not shrink where the map is poor.
+/// The similarity is that of least squares (Umeyama 1991), its scale the ratio of the spreads, which does not shrink
+/// where the map is poor.
 ///
 /// # Errors
 /// If the donors are not those of both meshes.

@@ -11,8 +11,8 @@ use crate::point_map::PointMap;
 /// Vertices and faces of the source come first, each shape with a largest extent of 1.
 ///
 /// # Errors
-/// If the map is not one of these meshes, a coordinate overflows, or both together have more vertices than 32-bit indices can
-/// name.
+/// If the map is not one of these meshes, a coordinate overflows, or both together have more vertices than 32-bit
+/// indices can name.
 pub fn side_by_side(source: &Mesh, target: &Mesh, map: &PointMap) -> Result<(Mesh, Attributes), RenderError> {
     check_map(map, source, target)?;
     let colors_target = position_colors(target);

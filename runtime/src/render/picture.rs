@@ -22,8 +22,8 @@ const TURN: f64 = 0.35;
 const FILL: f64 = 0.94;
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 
-/// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, 1 or more, twice as
-/// many columns. Errors as of [`side_by_side`].
+/// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, 1 or
+/// more, twice as many columns. Errors as of [`side_by_side`].
 pub fn pair_picture(
     source: &Mesh,
     target: &Mesh,
@@ -36,8 +36,8 @@ pub fn pair_picture(
     Ok(picture(&mesh, &attributes.vertex_colors.unwrap_or_default(), 2 * half, half))
 }
 
-/// A mesh seen along the negative z axis, y up, lit from the viewer's side, with the given colours of its vertices, `[n]`
-/// RGBA; vertices beyond these are grey. Faces seen from behind are drawn as well.
+/// A mesh seen along the negative z axis, y up, lit from the viewer's side, with the given colours of its vertices,
+/// `[n]` RGBA; vertices beyond these are grey. Faces seen from behind are drawn as well.
 pub fn picture(mesh: &Mesh, colors: &[[u8; 4]], width: usize, height: usize) -> Picture {
     let mut canvas = Canvas::new(width, height);
     let points = on_screen(mesh, width, height);
@@ -51,8 +51,8 @@ pub fn picture(mesh: &Mesh, colors: &[[u8; 4]], width: usize, height: usize) -> 
     canvas.finish()
 }
 
-/// A mesh seen as in [`picture`], with an image on it: `corner_uvs`, `[m, 3, 2]`, are the texture coordinates of its triangles'
-/// corners, `(0, 0)` the image's lower left; the image repeats beyond its edges.
+/// A mesh seen as in [`picture`], with an image on it: `corner_uvs`, `[m, 3, 2]`, are the texture coordinates of its
+/// triangles' corners, `(0, 0)` the image's lower left; the image repeats beyond its edges.
 pub fn textured_picture(
     mesh: &Mesh,
     corner_uvs: &[[[f32; 2]; 3]],

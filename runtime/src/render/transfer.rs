@@ -1,8 +1,8 @@
 //! Attributes carried over a map.
 //!
-//! A map gives each source vertex a target vertex, so the source can take whatever the target has, vertex by vertex. The other
-//! way round each target vertex takes from the source vertex whose match is nearest on the target. Where neighbours share a match,
-//! [`Donors::interpolated`] finds places within the giver's triangles.
+//! A map gives each source vertex a target vertex, so the source can take whatever the target has, vertex by vertex.
+//! The other way round each target vertex takes from the source vertex whose match is nearest on the target. Where
+//! neighbours share a match, [`Donors::interpolated`] finds places within the giver's triangles.
 
 use super::blend::{Blend, blends};
 use super::error::{RenderError, check_target};
@@ -35,8 +35,8 @@ impl Donors {
         Self::new(map.iter().collect())
     }
 
-    /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several that match
-    /// the same vertex, from the one of the lowest index.
+    /// The target receives: each vertex from the source vertex whose match is nearest along the edges; of several
+    /// that match the same vertex, from the one of the lowest index.
     ///
     /// # Errors
     /// If a match is no vertex of the target.
@@ -73,8 +73,9 @@ impl Donors {
         Self { places: vec![None; nearest.len()], nearest }
     }
 
-    /// The same with places within the giver's triangles where neighbouring vertices share a donor: the receiver is finer than
-    /// the giver, or the map is blurred, and values would come out in steps. Vertices with a donor of their own keep it.
+    /// The same with places within the giver's triangles where neighbouring vertices share a donor: the receiver is
+    /// finer than the giver, or the map is blurred, and values would come out in steps. Vertices with a donor of
+    /// their own keep it.
     ///
     /// # Errors
     /// If the meshes are not those of the donors.
@@ -85,8 +86,8 @@ impl Donors {
         Ok(Self { places, ..self })
     }
 
-    /// The same with the places on the target's surface that the map itself names ([`PointMap::points`]), where the source
-    /// receives; as it is for a map without.
+    /// The same with the places on the target's surface that the map itself names ([`PointMap::points`]), where the
+    /// source receives; as it is for a map without.
     ///
     /// # Errors
     /// If a place is on no triangle of the target.
@@ -193,8 +194,8 @@ impl Ord for Ordered {
     }
 }
 
-/// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match. Labels want
-/// [`Donors::nearest_vertices`] instead.
+/// Rows of `values`, `[n_giver, q]`, for the receiving vertices, `[n_receiver, q]`; NaN where there is no match.
+/// Labels want [`Donors::nearest_vertices`] instead.
 ///
 /// # Errors
 /// If a donor has no row.
@@ -234,8 +235,9 @@ pub fn transfer_landmarks(
 
 /// Colours, texture coordinates, scalar fields and skin weights of the giver, for the receiver's vertices and corners.
 ///
-/// Vertices without a match are grey, NaN, -1 (0 where the type has no sign) and without weights, triangles without any at the texture's origin. At a seam of the giver's
-/// texture a vertex has several coordinates; each receiving triangle takes those of one side, so that no triangle spans the seam.
+/// Vertices without a match are grey, NaN, -1 (0 where the type has no sign) and without weights, triangles without
+/// any at the texture's origin. At a seam of the giver's texture a vertex has several coordinates; each receiving
+/// triangle takes those of one side, so that no triangle spans the seam.
 ///
 /// # Errors
 /// If the attributes are not those of the giver, or the donors not those of both meshes.

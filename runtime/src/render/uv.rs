@@ -1,7 +1,8 @@
 //! Texture coordinates over a map, with no triangle across a seam.
 //!
-//! A texture's coordinates belong to corners, not to vertices: along a seam a vertex has one for each side. A receiving triangle
-//! must take all three of its own from one side, or the whole of the image between both sides is squeezed into it.
+//! A texture's coordinates belong to corners, not to vertices: along a seam a vertex has one for each side. A
+//! receiving triangle must take all three of its own from one side, or the whole of the image between both sides is
+//! squeezed into it.
 
 use super::Donors;
 use super::blend::{Blend, closest_point, combine, faces_around};
@@ -10,7 +11,8 @@ use crate::mesh::vec3;
 
 type Uv = [f32; 2];
 
-/// A triangle may be stretched so much more than the giver's there (squared: four times in length) before it counts as across a seam.
+/// A triangle may be stretched so much more than the giver's there (squared: four times in length) before it counts
+/// as across a seam.
 const MOST_STRETCHED: f64 = 16.0;
 
 /// A place with weights as near to 0 or 1 as this is on an edge or at a corner.
@@ -18,9 +20,10 @@ const AT: f64 = 1e-6;
 
 /// Texture coordinates `[m_receiver, 3, 2]` from the giver's `[m_giver, 3, 2]`.
 ///
-/// Triangles whose donors are the corners of a giver's triangle take its coordinates as they are. Others take those that their
-/// corners have in one chart of the texture, if that does not lead across a seam within the chart; else the closest ones on the
-/// side of the seam that their middle is on. Corners without a match take another corner's, triangles without any are at the origin.
+/// Triangles whose donors are the corners of a giver's triangle take its coordinates as they are. Others take those
+/// that their corners have in one chart of the texture, if that does not lead across a seam within the chart; else
+/// the closest ones on the side of the seam that their middle is on. Corners without a match take another corner's,
+/// triangles without any are at the origin.
 pub(super) fn corner_uvs(giver: &Mesh, uvs: &[[Uv; 3]], receiver: &Mesh, donors: &Donors) -> Vec<[Uv; 3]> {
     let giver = Giver::new(giver, uvs);
     let spots: Vec<Option<Spot>> = (0..donors.len()).map(|v| giver.spot(donors, v)).collect();
@@ -51,7 +54,8 @@ struct Giver<'a> {
     /// The coordinates of each vertex, and which chart they are in.
     of_vertex: Vec<Vec<(Uv, u32)>>,
     chart_of_face: Vec<u32>,
-    /// For each vertex how much its triangles are stretched at most: squared sides in the texture over those on the surface.
+    /// For each vertex how much its triangles are stretched at most: squared sides in the texture over those on the
+    /// surface.
     stretch: Vec<f64>,
 }
 
@@ -113,7 +117,8 @@ impl<'a> Giver<'a> {
         })
     }
 
-    /// The coordinates that a spot may have: one within a triangle, on an edge or at a vertex one for each side of a seam.
+    /// The coordinates that a spot may have: one within a triangle, on an edge or at a vertex one for each side of a
+    /// seam.
     fn choices(&self, spot: &Spot) -> Vec<(Uv, u32)> {
         let Some(blend) = spot.blend else { return self.of_vertex[spot.vertex as usize].clone() };
         let on = |blend: Blend| (self.within(blend), self.chart_of_face[blend.face as usize]);
@@ -147,7 +152,8 @@ impl<'a> Giver<'a> {
         extent(uvs) <= MOST_STRETCHED * stretch * sides(spots.map(|spot| spot.point))
     }
 
-    /// Coordinates from the triangles around that are on one side of the seam, the one that the middle of the spots is on.
+    /// Coordinates from the triangles around that are on one side of the seam, the one that the middle of the spots
+    /// is on.
     fn on_one_side(&self, spots: &[Spot; 3]) -> [Uv; 3] {
         let mut around: Vec<u32> =
             spots.iter().flat_map(|spot| self.faces_of[spot.vertex as usize].iter().copied()).collect();

@@ -1,5 +1,5 @@
-//! A self-contained HTML page with both shapes of a pair, coloured by the map: turn and zoom with the mouse, hover a point to
-//! see its match. It opens from disk and needs no network.
+//! A self-contained HTML page with both shapes of a pair, coloured by the map: turn and zoom with the mouse, hover a
+//! point to see its match. It opens from disk and needs no network.
 
 use super::error::{RenderError, check_map};
 use super::{map_colors, position_colors};

@@ -1,9 +1,9 @@
 //! One shape: the mesh that quantities live on, the way back to the input's vertices, and a store of named quantities.
 //!
-//! [`Shape::new`] repairs, and subdivides or decimates. Everything else is a quantity ([`quantities`]), computed when first asked for: the
-//! Laplacian, the eigenbasis, gradients of the eigenfunctions, the wave kernel signature, SHOT, the eigenbasis at full
-//! resolution. With a [`Cache`] each is kept under (mesh, quantity, its own options, its version), so that another `k` does
-//! not compute SHOT anew, and a model that takes no SHOT never computes it.
+//! [`Shape::new`] repairs, and subdivides or decimates. Everything else is a quantity ([`quantities`]), computed when
+//! first asked for: the Laplacian, the eigenbasis, gradients of the eigenfunctions, the wave kernel signature, SHOT,
+//! the eigenbasis at full resolution. With a [`Cache`] each is kept under (mesh, quantity, its own options, its
+//! version), so that another `k` does not compute SHOT anew, and a model that takes no SHOT never computes it.
 
 mod pieces;
 pub mod quantities;
@@ -29,11 +29,11 @@ pub use way_back::WayBack;
 pub struct ShapeOptions {
     /// Meshes of more vertices than this are decimated to it; 4 or more, `None`: never. Default 15000, as in the paper.
     pub decimate: Option<usize>,
-    /// Meshes of fewer vertices than this are subdivided to so many, or to as many as `decimate` allows; `None`: never. Default
-    /// `None`.
+    /// Meshes of fewer vertices than this are subdivided to so many, or to as many as `decimate` allows; `None`:
+    /// never. Default `None`.
     pub subdivide: Option<usize>,
-    /// For a part of a shape: the area of the whole, in squared units of the mesh, above 0. The SHOT radius is then relative
-    /// to it, and so is [`Shape::unit_basis`]. `None`: the shape is whole. Default `None`.
+    /// For a part of a shape: the area of the whole, in squared units of the mesh, above 0. The SHOT radius is then
+    /// relative to it, and so is [`Shape::unit_basis`]. `None`: the shape is whole. Default `None`.
     pub whole_area: Option<f64>,
 }
 
@@ -111,8 +111,8 @@ const CARRIED_WITHIN: f64 = 0.05;
 const MESH_VERSION: u32 = 5;
 
 impl Shape {
-    /// Repairs and, where it is smaller or larger than the options say, subdivides or decimates a mesh as read; `name` is for
-    /// messages.
+    /// Repairs and, where it is smaller or larger than the options say, subdivides or decimates a mesh as read;
+    /// `name` is for messages.
     ///
     /// # Errors
     /// If repair leaves no face, the area of the whole or the decimation target is out of range, or the cache cannot be
@@ -190,7 +190,8 @@ impl Shape {
         self.warnings.lines().for_each(|text| observer(Event::Warning(format!("{}: {text}", self.name))));
     }
 
-    /// The key of the processed mesh: the input's content, the options and their version. Quantities derive theirs from it.
+    /// The key of the processed mesh: the input's content, the options and their version. Quantities derive theirs
+    /// from it.
     pub fn key(&self) -> CacheKey {
         self.key
     }
@@ -250,7 +251,8 @@ impl Shape {
         self.whole_area.unwrap_or_else(|| self.mesh().area())
     }
 
-    /// The shape as a part of a whole of another area, in squared units of the mesh; what does not depend on that stays computed.
+    /// The shape as a part of a whole of another area, in squared units of the mesh; what does not depend on that
+    /// stays computed.
     pub(crate) fn part_of(&self, whole_area: f64) -> Self {
         let mut part = self.clone();
         part.whole_area = Some(whole_area);
@@ -259,8 +261,8 @@ impl Shape {
         part
     }
 
-    /// The mirror image of the working mesh, whose vertices are those of this one and whose faces are turned round, so that its normals are
-    /// outside again. It is whole.
+    /// The mirror image of the working mesh, whose vertices are those of this one and whose faces are turned round,
+    /// so that its normals are outside again. It is whole.
     pub fn mirrored(&self) -> Self {
         let mesh = self.mesh();
         let vertices = mesh.vertices().iter().map(|&[x, y, z]| [-x, y, z]).collect();

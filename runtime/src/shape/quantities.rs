@@ -73,8 +73,8 @@ impl Shape {
     /// The first eigenpairs of the Laplacian in the mesh's own unit, `k` of them or more.
     ///
     /// # Errors
-    /// If the mesh has fewer eigenpairs ([`Shape::max_eigenpairs`]), they would take more memory than there is, the solver
-    /// does not converge, or the cache cannot be written; it names the shape.
+    /// If the mesh has fewer eigenpairs ([`Shape::max_eigenpairs`]), they would take more memory than there is, the
+    /// solver does not converge, or the cache cannot be written; it names the shape.
     pub fn eigenbasis(&self, k: usize, context: Context) -> Result<Arc<Eigenbasis>, Error> {
         if let Some(basis) = self.store().eigenbasis.as_ref().filter(|basis| basis.k() >= k) {
             return Ok(basis.clone());
@@ -169,7 +169,8 @@ impl Shape {
         Ok(descriptors)
     }
 
-    /// The first `k` eigenpairs of the full mesh at unit area; of a mesh that is not decimated, at most as many as it has.
+    /// The first `k` eigenpairs of the full mesh at unit area; of a mesh that is not decimated, at most as many as it
+    /// has.
     ///
     /// # Errors
     /// As [`Shape::eigenbasis`].

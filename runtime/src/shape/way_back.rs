@@ -3,14 +3,14 @@
 use crate::Mesh;
 use crate::mesh::{Repaired, nearest_vertices};
 
-/// Index maps between the input mesh, the repaired mesh ("full") and the mesh that quantities live on ("work"), which is the
-/// full one or a decimated one.
+/// Index maps between the input mesh, the repaired mesh ("full") and the mesh that quantities live on ("work"), which
+/// is the full one or a decimated one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WayBack {
     /// Input vertex of each vertex of the full mesh, of one that subdivision made the nearest, `[n_full]`.
     pub input_of_full: Vec<u32>,
-    /// For each input vertex its vertex of the full mesh, `[n_input]`: of one that repair left out the nearest, of one without a face
-    /// [`WayBack::NONE`].
+    /// For each input vertex its vertex of the full mesh, `[n_input]`: of one that repair left out the nearest, of
+    /// one without a face [`WayBack::NONE`].
     pub full_of_input: Vec<u32>,
     /// Input vertices that repair left out, ascending: of small pieces and of faces without area.
     pub followers: Vec<u32>,

@@ -61,8 +61,8 @@ impl Eigenbasis {
         self.mass.iter().sum()
     }
 
-    /// The first `k` eigenpairs where an area of `area` (above 0, in squared units of the mesh) counts as 1. For a part of
-    /// a shape it is the area of the whole, so that the eigenvalues of both are in one unit.
+    /// The first `k` eigenpairs where an area of `area` (above 0, in squared units of the mesh) counts as 1. For a
+    /// part of a shape it is the area of the whole, so that the eigenvalues of both are in one unit.
     ///
     /// # Panics
     /// If there are fewer than `k`.

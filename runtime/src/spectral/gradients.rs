@@ -17,11 +17,11 @@ pub struct EigenGradients {
 
 /// The gradients of the columns of `basis`, `[n, k]` twice, in 1 / unit of the mesh times the unit of the eigenvectors.
 ///
-/// A function that is linear on each triangle has a constant gradient there; at a vertex it is the mean over the triangles
-/// around it, weighted by area. It is given in an orthonormal frame of the plane across the vertex normal (the sum of the
-/// area-weighted face normals), right-handed with the normal as third axis. Which frame is arbitrary, and nothing should
-/// depend on it: `x + i y` is determined up to a rotation at each vertex, and mirroring the mesh conjugates it. Where a vertex has no
-/// normal or no triangle, the gradient is 0.
+/// A function that is linear on each triangle has a constant gradient there; at a vertex it is the mean over the
+/// triangles around it, weighted by area. It is given in an orthonormal frame of the plane across the vertex normal
+/// (the sum of the area-weighted face normals), right-handed with the normal as third axis. Which frame is arbitrary,
+/// and nothing should depend on it: `x + i y` is determined up to a rotation at each vertex, and mirroring the mesh
+/// conjugates it. Where a vertex has no normal or no triangle, the gradient is 0.
 ///
 /// # Panics
 /// If the basis is not of the mesh's vertices.
@@ -83,8 +83,8 @@ impl Stencils {
         stencils
     }
 
-    /// The gradient of the hat function at a corner is `normal x opposite edge / (2 area)`; its share of the mean is the
-    /// face's area over `around`, that of all faces around the vertex.
+    /// The gradient of the hat function at a corner is `normal x opposite edge / (2 area)`; its share of the mean is
+    /// the face's area over `around`, that of all faces around the vertex.
     fn add_face(&mut self, mesh: &Mesh, face: usize, frame: [[f64; 3]; 2], around: f64) {
         let corners = mesh.corners(face);
         let cross = mesh.face_cross(face);
@@ -115,7 +115,8 @@ impl Stencils {
     }
 }
 
-/// Two orthonormal axes that with the direction of `normal` make a right-handed frame; `None` where it has no direction.
+/// Two orthonormal axes that with the direction of `normal` make a right-handed frame; `None` where it has no
+/// direction.
 fn tangent_frame(normal: [f64; 3]) -> Option<[[f64; 3]; 2]> {
     let length = vec3::norm(normal);
     if !(length > 0.0 && length.is_finite()) {

@@ -30,9 +30,9 @@ impl Default for WksOptions {
 
 /// The weight of each eigenpair in each energy, `[q, k]`, each row of sum 1; eigenvalues are at unit area.
 ///
-/// With `l` the logarithms of the eigenvalues above zero, energies `e` lie evenly between `l_min + 2 s` and `l_max / 1.02 - 2 s`, `s =
-/// 7 (l_max / 1.02 - l_min) / q`; the weights are `exp(-(e - l)^2 / (2 s^2))`. The first eigenpair and those of eigenvalue
-/// zero have none.
+/// With `l` the logarithms of the eigenvalues above zero, energies `e` lie evenly between `l_min + 2 s` and
+/// `l_max / 1.02 - 2 s`, `s = 7 (l_max / 1.02 - l_min) / q`; the weights are `exp(-(e - l)^2 / (2 s^2))`. The first
+/// eigenpair and those of eigenvalue zero have none.
 pub fn wks_weights(eigenvalues: &[f64], energies: usize) -> Matrix {
     let logarithm = |i: usize| (i > 0 && eigenvalues[i] > WKS_ZERO).then(|| eigenvalues[i].ln());
     let logarithms: Vec<Option<f64>> = (0..eigenvalues.len()).map(logarithm).collect();
@@ -57,11 +57,11 @@ pub fn wks_weights(eigenvalues: &[f64], energies: usize) -> Matrix {
     weights
 }
 
-/// The wave kernel signature of every vertex, `[n, energies]` (Aubry, Schlickewei and Cremers 2011): `sum_i w_ei phi_i^2` with the
-/// weights of [`wks_weights`] of energy `e`.
+/// The wave kernel signature of every vertex, `[n, energies]` (Aubry, Schlickewei and Cremers 2011):
+/// `sum_i w_ei phi_i^2` with the weights of [`wks_weights`] of energy `e`.
 ///
-/// `basis` is at unit area ([`Eigenbasis::at_unit_area`]); all its eigenpairs are used. The signature does not change with pose, position
-/// or scale, and is the same on both sides of a symmetric body.
+/// `basis` is at unit area ([`Eigenbasis::at_unit_area`]); all its eigenpairs are used. The signature does not change
+/// with pose, position or scale, and is the same on both sides of a symmetric body.
 pub fn wks(basis: &Eigenbasis, energies: usize) -> Matrix<f32> {
     wks_of(&basis.eigenvalues, &basis.eigenvectors.map(|phi| phi as f32), energies)
 }

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 /// Matches near a vertex that it looks at.
 const NEAR: usize = 12;
-/// The kernel is as wide as the distance to the match of this rank, from 0: a few matches share in a residual, so that it does not jump where
-/// the decimated target is coarse.
+/// The kernel is as wide as the distance to the match of this rank, from 0: a few matches share in a residual, so
+/// that it does not jump where the decimated target is coarse.
 const WIDTH_RANK: usize = 3;
 /// A match is taken to be wrong where the functional map misses it by more than this many times what it misses at
 /// [`RIGHT`] of the matches.
@@ -16,15 +16,16 @@ const OUTLIER: f64 = 5.0;
 /// A share of the matches that are right for sure; low, so that wrong ones hardly change what is usual among them.
 const RIGHT: f64 = 0.35;
 
-/// `C phi(x)` at every vertex of the source plus the residual `psi(y_j) - C phi(x_j)` of the matches near it, `[n, k_target]`.
+/// `C phi(x)` at every vertex of the source plus the residual `psi(y_j) - C phi(x_j)` of the matches near it,
+/// `[n, k_target]`.
 ///
-/// A functional map of `k` eigenfunctions is smooth: it cannot follow a map that varies faster. Its residual at a match
-/// is what it misses there, and at a vertex the mean of those nearby by `exp(-d^2 / s^2)`, with `d` the distance of rows
-/// of `phi` and `s` that to the fourth nearest match. Matches that the map misses by far are left out, as they are wrong; so are vertices
-/// near in space but far on the surface, as their rows of `phi` differ.
+/// A functional map of `k` eigenfunctions is smooth: it cannot follow a map that varies faster. Its residual at a
+/// match is what it misses there, and at a vertex the mean of those nearby by `exp(-d^2 / s^2)`, with `d` the
+/// distance of rows of `phi` and `s` that to the fourth nearest match. Matches that the map misses by far are left
+/// out, as they are wrong; so are vertices near in space but far on the surface, as their rows of `phi` differ.
 ///
-/// `transported` holds the rows `C phi(x)`, `[n, k_target]`; `phi` is `[n, k_source]`, `psi` `[n_target, k_target]`; `vertices` are the
-/// positions of the source, `[n]`, and `matches` pairs of its vertices and the target's.
+/// `transported` holds the rows `C phi(x)`, `[n, k_target]`; `phi` is `[n, k_source]`, `psi` `[n_target, k_target]`;
+/// `vertices` are the positions of the source, `[n]`, and `matches` pairs of its vertices and the target's.
 pub(super) fn add_residuals(
     transported: &mut Matrix,
     phi: &Matrix,

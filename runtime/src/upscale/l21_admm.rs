@@ -1,8 +1,8 @@
 //! `min_C || C F^ - G^ ||_{2,1}` (the paper's equation "upscale") by ADMM.
 //!
 //! With the matches as rows, `x_j = phi(x_j)` and `y_j = psi(y_j)`, and `M = C^T`, the problem is
-//! `min_M sum_j || x_j M - y_j ||_2`. Splitting `z_j = x_j M - y_j` gives, with scaled multipliers `u_j` (Boyd et al. 2011,
-//! section 3.1.1):
+//! `min_M sum_j || x_j M - y_j ||_2`. Splitting `z_j = x_j M - y_j` gives, with scaled multipliers `u_j` (Boyd et al.
+//! 2011, section 3.1.1):
 //!
 //! - `M <- X^+ (Y + Z - U)`,
 //! - `z_j <- shrink(x_j M - y_j + u_j, 1 / rho)`, the proximal map of the l2 norm,
@@ -37,7 +37,8 @@ impl Default for AdmmOptions {
 pub struct AdmmInfo {
     /// Iterations done.
     pub iterations: usize,
-    /// Whether both residuals fell below the tolerance, or least squares fit already. If not, the map is the last iterate.
+    /// Whether both residuals fell below the tolerance, or least squares fit already. If not, the map is the last
+    /// iterate.
     pub converged: bool,
     /// The objective, `|| C F^ - G^ ||_{2,1}`, at the end.
     pub objective: f64,
@@ -45,8 +46,8 @@ pub struct AdmmInfo {
     pub initial_objective: f64,
     /// `|| X M - Y - Z ||_F` relative to the largest norm of its three terms.
     pub primal_residual: f64,
-    /// `|| Z - Z_before ||_F` relative to the norm of the scaled multipliers `U`: the bound of the dual residual, without the
-    /// factor `X^T`.
+    /// `|| Z - Z_before ||_F` relative to the norm of the scaled multipliers `U`: the bound of the dual residual,
+    /// without the factor `X^T`.
     pub dual_residual: f64,
 }
 
@@ -92,12 +93,12 @@ pub enum UpscaleError {
 
 /// The functional map `C`, `[k_target, k_source]`, that minimises the l2,1 norm over the matches.
 ///
-/// `phi` is `[m, k_source]` and `psi` `[m, k_target]`, as [`super::delta_coefficients`] gives them. The result does not depend
-/// on the number of threads.
+/// `phi` is `[m, k_source]` and `psi` `[m, k_target]`, as [`super::delta_coefficients`] gives them. The result does
+/// not depend on the number of threads.
 ///
 /// # Errors
-/// If the numbers of rows differ or are fewer than `k_source`, `k_source` or `k_target` is 0, or the rows of `phi` do not
-/// determine the map.
+/// If the numbers of rows differ or are fewer than `k_source`, `k_source` or `k_target` is 0, or the rows of `phi` do
+/// not determine the map.
 pub fn l21_functional_map(
     phi: &Matrix,
     psi: &Matrix,

@@ -1,8 +1,9 @@
 //! From the map of two decimated shapes to the map of the full ones (the paper's section "Upscaling").
 //!
-//! Every vertex of the decimated source gives a match between two vertices of the full shapes. The functional map of the
-//! full shapes that agrees best with these matches, [`l21_functional_map`], is then read off at every vertex by nearest
-//! neighbour, [`full_point_map`]. The l2,1 norm lets wrong matches stay wrong instead of bending the map towards them.
+//! Every vertex of the decimated source gives a match between two vertices of the full shapes. The functional map of
+//! the full shapes that agrees best with these matches, [`l21_functional_map`], is then read off at every vertex by
+//! nearest neighbour, [`full_point_map`]. The l2,1 norm lets wrong matches stay wrong instead of bending the map
+//! towards them.
 
 mod interpolate;
 mod l21_admm;
@@ -32,17 +33,18 @@ pub fn delta_coefficients(
     (basis_source.eigenvectors.select_rows(&sources), basis_target.eigenvectors.select_rows(&targets))
 }
 
-/// The point map of the full shapes, of a functional map `c`, `[k_target, k_source]`, of theirs and the matches that it was found from.
+/// The point map of the full shapes, of a functional map `c`, `[k_target, k_source]`, of theirs and the matches that
+/// it was found from.
 ///
-/// For each source vertex `x` the target vertex whose row of `psi` is nearest to `C phi(x)` plus what `C` misses at the
-/// matches near `x`, as far as these are right. The paper does without the latter; then the map of the full shapes is as
-/// smooth as `k` eigenfunctions, and worse than that of the decimated ones. `vertices` are the positions of the source,
-/// `[n_source, 3]`; `matches` are pairs (source vertex, target vertex). The confidence is the cosine of the angle between
-/// what is compared.
+/// For each source vertex `x` the target vertex whose row of `psi` is nearest to `C phi(x)` plus what `C` misses at
+/// the matches near `x`, as far as these are right. The paper does without the latter; then the map of the full
+/// shapes is as smooth as `k` eigenfunctions, and worse than that of the decimated ones. `vertices` are the positions
+/// of the source, `[n_source, 3]`; `matches` are pairs (source vertex, target vertex). The confidence is the cosine
+/// of the angle between what is compared.
 ///
 /// # Errors
-/// If `c` or `vertices` does not fit the bases, a match names a vertex that does not exist, or an entry of `c` or a basis is
-/// not finite.
+/// If `c` or `vertices` does not fit the bases, a match names a vertex that does not exist, or an entry of `c` or a
+/// basis is not finite.
 pub fn full_point_map(
     c: &Matrix,
     basis_source: &Eigenbasis,

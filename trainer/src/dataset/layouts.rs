@@ -1,8 +1,8 @@
 //! Recognition of the field's dataset folders by their file names.
 //!
-//! FAUST: 10 subjects of 10 poses, `tr_reg_SPP`; the paper trains on subjects 0-7 and tests on 8-9. Settings are chosen on
-//! subjects 6-7, so the splits are 000-059 train, 060-079 validation, 080-099 test. SCAPE: 71 poses, the last 20 test, as the
-//! successors of the paper do. TOSCA: one group for each class, every fifth shape validation.
+//! FAUST: 10 subjects of 10 poses, `tr_reg_SPP`; the paper trains on subjects 0-7 and tests on 8-9. Settings are
+//! chosen on subjects 6-7, so the splits are 000-059 train, 060-079 validation, 080-099 test. SCAPE: 71 poses, the
+//! last 20 test, as the successors of the paper do. TOSCA: one group for each class, every fifth shape validation.
 
 use super::{Correspondence, DatasetError, ShapeEntry, Split, shrec16};
 use fmnet::io::MeshFormat;

@@ -42,10 +42,11 @@ pub enum Correspondence {
     First(usize),
     /// Line `i` of a `.vts` file holds the 1-based vertex of point `i`, 0 where the shape lacks it.
     Vts(PathBuf),
-    /// Line `i` of a `.corr` file holds the 1-based triangle of point `i` and its three weights, -1 where the shape lacks it.
+    /// Line `i` of a `.corr` file holds the 1-based triangle of point `i` and its three weights, -1 where the shape
+    /// lacks it.
     Surface(PathBuf),
-    /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place; the shape lacks
-    /// it where none is within 0.02 sqrt(area), or an edge of a coarse scan, as in a hole.
+    /// Point `i` is the vertex nearest to vertex `i` of a registered template, which lies in the same place; the
+    /// shape lacks it where none is within 0.02 sqrt(area), or an edge of a coarse scan, as in a hole.
     NearestTo(PathBuf),
     /// Line `v` of a SHREC'16 `.baryc_gt` file says where vertex `v` lies on the whole shape (the second path).
     Barycentric(PathBuf, PathBuf),
@@ -64,8 +65,8 @@ pub struct ShapeEntry {
     pub correspondence: Correspondence,
     /// Its part of the dataset.
     pub split: Split,
-    /// For a part of a shape: the mesh of a whole of its group in the same unit, in whatever pose. A part may be a source, never
-    /// a target.
+    /// For a part of a shape: the mesh of a whole of its group in the same unit, in whatever pose. A part may be a
+    /// source, never a target.
     pub whole: Option<PathBuf>,
 }
 
@@ -157,8 +158,8 @@ impl Dataset {
     }
 }
 
-/// Checks that the shapes of each group have equally many points, given the number of each: else they do not correspond, whatever
-/// their names say.
+/// Checks that the shapes of each group have equally many points, given the number of each: else they do not
+/// correspond, whatever their names say.
 ///
 /// # Errors
 /// If two shapes of a group do not.
@@ -238,11 +239,11 @@ impl ShapeEntry {
         }
     }
 
-    /// Where on `mesh`, as read, every point of the group lies, `[points]`, `None` where the shape lacks it. A point that is a
-    /// vertex of no triangle is on no surface, so it is `None` as well.
+    /// Where on `mesh`, as read, every point of the group lies, `[points]`, `None` where the shape lacks it. A point
+    /// that is a vertex of no triangle is on no surface, so it is `None` as well.
     ///
-    /// [`fmnet::mesh::carried_points`] takes them to the repaired and the decimated mesh, whose triangles are others: each to
-    /// the closest point of the same skin.
+    /// [`fmnet::mesh::carried_points`] takes them to the repaired and the decimated mesh, whose triangles are others:
+    /// each to the closest point of the same skin.
     ///
     /// # Errors
     /// If the correspondence cannot be read or does not fit the mesh.
@@ -289,8 +290,8 @@ fn nearest_points(mesh: &Mesh, template: &Mesh) -> Vec<u32> {
 }
 
 impl ShapeEntry {
-    /// The vertex of the left-right mirror image of every point, `[points]`, where a file `NAME.sym.vts` beside `NAME.vts`
-    /// says.
+    /// The vertex of the left-right mirror image of every point, `[points]`, where a file `NAME.sym.vts` beside
+    /// `NAME.vts` says.
     ///
     /// # Errors
     /// If that file cannot be read or does not fit the mesh.

@@ -51,8 +51,8 @@ fn number(name: &str) -> Option<u64> {
     name[name.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
 }
 
-/// For each vertex of the whole shape the vertex, below `n`, of the part that lies nearest to it by barycentric weight, or
-/// [`MISSING`].
+/// For each vertex of the whole shape the vertex, below `n`, of the part that lies nearest to it by barycentric
+/// weight, or [`MISSING`].
 pub(super) fn points(ground_truth: &Path, whole: &Path, n: usize) -> Result<Vec<u32>, DatasetError> {
     let whole = read_mesh(whole)?.mesh;
     let on_whole = read_surface_points(ground_truth, whole.n_faces())?;

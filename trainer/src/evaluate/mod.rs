@@ -1,7 +1,9 @@
-//! The field's protocol over a dataset: every method matches every pair, and each map is compared with the ground truth.
+//! The field's protocol over a dataset: every method matches every pair, and each map is compared with the ground
+//! truth.
 //!
-//! [`evaluate`] gives, for each [`Method`], the errors of every pair, the average curve, and for computed maps what their
-//! descriptors are worth (CMC curve, distances of correct matches); [`report`] writes tables, plots and pictures of that.
+//! [`evaluate`] gives, for each [`Method`], the errors of every pair, the average curve, and for computed maps what
+//! their descriptors are worth (CMC curve, distances of correct matches); [`report`] writes tables, plots and
+//! pictures of that.
 
 mod descriptors;
 mod pairs;
@@ -48,7 +50,8 @@ pub enum MapSource {
 /// Settings of [`evaluate`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvaluateOptions {
-    /// Whether a left-right mirrored map counts as right where the dataset knows the mirrored ground truth. Default false.
+    /// Whether a left-right mirrored map counts as right where the dataset knows the mirrored ground truth. Default
+    /// false.
     pub symmetric: bool,
     /// Ranks of the CMC curve; 0: no figures of descriptors. Default 100.
     pub ranks: usize,
@@ -202,8 +205,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Matches all `pairs` (indices into the dataset's shapes) with all methods. The observer hears of every pair.
 ///
 /// # Errors
-/// If there are no pairs, a shape or a map file cannot be read or does not fit its pair, a model cannot be loaded, or a pair
-/// cannot be matched.
+/// If there are no pairs, a shape or a map file cannot be read or does not fit its pair, a model cannot be loaded, or
+/// a pair cannot be matched.
 pub fn evaluate(
     dataset: &Dataset,
     pairs: &[(usize, usize)],

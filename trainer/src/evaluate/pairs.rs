@@ -30,9 +30,9 @@ pub enum PairError {
     },
 }
 
-/// At most `count` random ordered pairs (source, target), as indices into the dataset's shapes, of one group within the
-/// given splits, drawn by `seed`; a part of a shape is matched to whole shapes of any split, as a whole has no pose of its
-/// own to learn by heart.
+/// At most `count` random ordered pairs (source, target), as indices into the dataset's shapes, of one group within
+/// the given splits, drawn by `seed`; a part of a shape is matched to whole shapes of any split, as a whole has no
+/// pose of its own to learn by heart.
 pub fn random_pairs(dataset: &Dataset, splits: &[Split], count: usize, seed: u64) -> Vec<(usize, usize)> {
     let shapes = &dataset.shapes;
     let fits = |&(s, t): &(usize, usize)| {
@@ -48,8 +48,8 @@ pub fn random_pairs(dataset: &Dataset, splits: &[Split], count: usize, seed: u64
     pairs
 }
 
-/// The pairs (source, target), as indices into the dataset's shapes, of a text file: the names of source and target on each
-/// line, `#` begins a comment.
+/// The pairs (source, target), as indices into the dataset's shapes, of a text file: the names of source and target
+/// on each line, `#` begins a comment.
 ///
 /// # Errors
 /// If the list cannot be read, or a line does not name two shapes of one group.

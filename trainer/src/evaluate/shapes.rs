@@ -1,4 +1,5 @@
-//! The shapes of a dataset as evaluation needs them: meshes as they are on disk, their points, geodesics on the targets.
+//! The shapes of a dataset as evaluation needs them: meshes as they are on disk, their points, geodesics on the
+//! targets.
 
 use crate::dataset::{Dataset, DatasetError, MISSING, check_groups};
 use fmnet::Mesh;

@@ -13,8 +13,8 @@ const OPSET: i64 = 17;
 /// The version of the file format that came with opset 17.
 const IR_VERSION: i64 = 8;
 
-/// A graph under construction. Inside, features are `[width, n]`, a channel a row: tract (0.23) vectorises what it does to rows
-/// of any length, but not a short row spread over all rows. Every method returns the name of its result.
+/// A graph under construction. Inside, features are `[width, n]`, a channel a row: tract (0.23) vectorises what it
+/// does to rows of any length, but not a short row spread over all rows. Every method returns the name of its result.
 #[derive(Default)]
 pub struct GraphBuilder {
     inputs: Vec<ValueInfoProto>,

@@ -37,7 +37,8 @@ pub struct ModelOrigin {
     pub license: String,
     /// Revision of the source. Default: the version of this crate.
     pub commit: String,
-    /// What turns the measures of its maps into an estimate of their error. Default: none, and the library's own is used.
+    /// What turns the measures of its maps into an estimate of their error. Default: none, and the library's own is
+    /// used.
     pub calibration: Option<Calibration>,
 }
 

@@ -1,8 +1,8 @@
 //! The functional map layer: from spectral descriptors to the functional map `C`, differentiable.
 //!
 //! `F` `[k_source, q]` and `G` `[k_target, q]` are the descriptors of source and target in their eigenbases; `C`
-//! `[k_target, k_source]` takes functions from the source to the target, `C F = G` (paper, equation "ls"). The solve and its
-//! gradient are the runtime's, [`fmnet::fmap::FmapSolution`]; here is the Candle op around them.
+//! `[k_target, k_source]` takes functions from the source to the target, `C F = G` (paper, equation "ls"). The solve
+//! and its gradient are the runtime's, [`fmnet::fmap::FmapSolution`]; here is the Candle op around them.
 //!
 //! Everything is solved in double precision, whatever the type of the tensors.
 

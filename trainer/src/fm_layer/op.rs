@@ -18,13 +18,14 @@ pub struct FunctionalMap {
     pub condition: f64,
 }
 
-/// Solves for the functional map of the spectral descriptors `source` `[k_source, q]` and `target` `[k_target, q]`, both f32
-/// or both f64. `mask` is [`fmnet::fmap::resolvent_mask`], `[k_target, k_source]`; the least squares ignore
+/// Solves for the functional map of the spectral descriptors `source` `[k_source, q]` and `target` `[k_target, q]`,
+/// both f32 or both f64. `mask` is [`fmnet::fmap::resolvent_mask`], `[k_target, k_source]`; the least squares ignore
 /// it. Of the solvers those of one direction can be trained with, [`FmapSolver::LeastSquares`] and
 /// [`FmapSolver::Regularized`]. On a GPU the small systems are copied to the host and solved there.
 ///
 /// # Errors
-/// If the tensors do not fit together, the solver is another one, or the descriptors are not finite or those of the source all zero ([`FmLayerError`]).
+/// If the tensors do not fit together, the solver is another one, or the descriptors are not finite or those of the
+/// source all zero ([`FmLayerError`]).
 pub fn functional_map(
     source: &Tensor,
     target: &Tensor,

@@ -10,8 +10,8 @@ use std::sync::{Mutex, PoisonError};
 /// Rows of a task; fixed, so that results do not depend on the threads.
 const ROWS_PER_TASK: usize = 64;
 
-/// The mean over both directions of the cross entropy of telling each point's counterpart among all, by the cosines of their
-/// descriptors over `temperature`.
+/// The mean over both directions of the cross entropy of telling each point's counterpart among all, by the cosines
+/// of their descriptors over `temperature`.
 ///
 /// `source` and `target` are `[m, d]`, whose rows correspond.
 pub(crate) fn contrastive(source: &Tensor, target: &Tensor, temperature: f64) -> Result<Tensor> {

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct LossOptions {
-    /// `|C - C_gt|^2`, the functional maps of both directions against those of the ground truth (GeomFmaps, Donati et al.
-    /// 2020); default 0.02.
+    /// `|C - C_gt|^2`, the functional maps of both directions against those of the ground truth (GeomFmaps, Donati et
+    /// al. 2020); default 0.02.
     pub spectral: f64,
     /// InfoNCE over corresponding points (van den Oord et al. 2018); default 1.
     pub contrastive: f64,

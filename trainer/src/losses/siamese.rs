@@ -5,8 +5,8 @@ use candle_core::{Result, Tensor};
 /// The siamese loss (Hadsell et al. 2006):
 /// `gamma mean |f - f+|^2 + (1 - gamma) mean max(0, margin - |f - f-|)^2`.
 ///
-/// `source` and `target` are descriptors `[m, q]` whose rows correspond; `negatives` lists pairs (source row, target row)
-/// that do not. The paper sums where we take means, so that the step does not depend on the number of pairs.
+/// `source` and `target` are descriptors `[m, q]` whose rows correspond; `negatives` lists pairs (source row, target
+/// row) that do not. The paper sums where we take means, so that the step does not depend on the number of pairs.
 pub(crate) fn siamese(
     source: &Tensor,
     target: &Tensor,

@@ -1,5 +1,5 @@
-//! Losses that need no ground truth: bijectivity and orthogonality (Roufosse, Sharma and Ovsjanikov 2019), and the coupling of
-//! functional and point map (Cao, Roetzer and Bernard 2023).
+//! Losses that need no ground truth: bijectivity and orthogonality (Roufosse, Sharma and Ovsjanikov 2019), and the
+//! coupling of functional and point map (Cao, Roetzer and Bernard 2023).
 
 use candle_core::{D, Result, Tensor};
 use fmnet::Matrix;
@@ -32,8 +32,8 @@ pub(crate) struct SoftAssignment {
     pub(crate) basis_source: Matrix<f32>,
 }
 
-/// `|C - Psi^+ P Phi|^2`, where row `y` of `P` is the softmax over the source's points of the cosines of their descriptors
-/// with that of `y`, over the temperature.
+/// `|C - Psi^+ P Phi|^2`, where row `y` of `P` is the softmax over the source's points of the cosines of their
+/// descriptors with that of `y`, over the temperature.
 pub(crate) fn coupling(
     map: &Tensor,
     source: &Tensor,

@@ -1,8 +1,8 @@
 //! Descriptor networks with gradients: the paper's residual network and DiffusionNet.
 //!
-//! A network maps what it is given of a shape ([`NetworkInput`]) to descriptors `[n, d]`. All its parameters live in one flat
-//! variable; [`Network::parameters`] names its parts. On the CPU a network is one fused op with a backward pass written by
-//! hand; elsewhere it is composed of Candle's ops.
+//! A network maps what it is given of a shape ([`NetworkInput`]) to descriptors `[n, d]`. All its parameters live in
+//! one flat variable; [`Network::parameters`] names its parts. On the CPU a network is one fused op with a backward
+//! pass written by hand; elsewhere it is composed of Candle's ops.
 
 pub mod diffusion;
 pub mod residual;
@@ -55,8 +55,8 @@ pub trait Network: Send {
     /// If an input does not fit the network.
     fn forward(&self, shapes: &[&NetworkInput]) -> Result<Vec<Tensor>>;
 
-    /// Descriptors of the shapes of a training step, `[n, d]` each, differentiable by [`Network::variable`] once, and the
-    /// statistics of the step, for [`Network::accept`].
+    /// Descriptors of the shapes of a training step, `[n, d]` each, differentiable by [`Network::variable`] once, and
+    /// the statistics of the step, for [`Network::accept`].
     ///
     /// # Errors
     /// If an input does not fit the network.

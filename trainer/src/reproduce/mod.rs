@@ -1,7 +1,7 @@
 //! The paper's experiments, each from raw meshes to a report by one command.
 //!
-//! [`experiment`] describes one: what is generated, which networks are trained, what is tested. [`run`] does it. Trainings are
-//! shared between experiments, resumed where they stopped, and not repeated once done.
+//! [`experiment`] describes one: what is generated, which networks are trained, what is tested. [`run`] does it.
+//! Trainings are shared between experiments, resumed where they stopped, and not repeated once done.
 
 mod experiments;
 mod gallery;

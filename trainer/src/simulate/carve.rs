@@ -43,7 +43,8 @@ fn of_faces(mesh: &Mesh, faces: &[[u32; 3]]) -> Carved {
     Carved { mesh: Mesh::new(vertices, faces).expect("a part of a valid mesh is valid"), origin }
 }
 
-/// Vertices by their distance from `center` along edges, nearest first, for as long as `more(vertex, distance)` says so.
+/// Vertices by their distance from `center` along edges, nearest first, for as long as `more(vertex, distance)` says
+/// so.
 pub(super) fn spread(
     mesh: &Mesh,
     adjacency: &Adjacency,

@@ -1,15 +1,15 @@
 //! Stand-ins for data that is not at hand, made from registered shapes whose correspondence is known.
 //!
-//! - [`simulate_scan`] makes of a closed registration what a 3D scanner would have seen of it; [`write_scans`] a folder in the
-//!   layout of the FAUST scans.
-//! - [`cut_part`] cuts a part out of a shape; [`write_parts`] a folder in the layout of the SHREC'16 partial correspondence
-//!   benchmark (Cosmo et al. 2016), or one with a manifest where shapes do not share a triangulation.
+//! - [`simulate_scan`] makes of a closed registration what a 3D scanner would have seen of it; [`write_scans`] a
+//!   folder in the layout of the FAUST scans.
+//! - [`cut_part`] cuts a part out of a shape; [`write_parts`] a folder in the layout of the SHREC'16 partial
+//!   correspondence benchmark (Cosmo et al. 2016), or one with a manifest where shapes do not share a triangulation.
 //! - [`triangulated`] gives a shape another triangulation, with correspondences that are points on its surface;
 //!   [`write_triangulations`] a folder with a manifest.
 //!
-//! All folders are read by [`Dataset::open`](crate::dataset::Dataset::open) like the real ones. The same options and seed give
-//! the same files. An interrupted run goes on where it was: files are there in full or not at all, and those that are there
-//! are left alone.
+//! All folders are read by [`Dataset::open`](crate::dataset::Dataset::open) like the real ones. The same options and
+//! seed give the same files. An interrupted run goes on where it was: files are there in full or not at all, and
+//! those that are there are left alone.
 
 mod carve;
 mod folder;

@@ -1,4 +1,5 @@
-//! Parts of a whole, cut as for the SHREC'16 partial correspondence benchmark (Cosmo et al. 2016): with holes, or by a plane.
+//! Parts of a whole, cut as for the SHREC'16 partial correspondence benchmark (Cosmo et al. 2016): with holes, or by
+//! a plane.
 
 use super::carve::{Carved, carve, largest_component, spread};
 use super::random::{direction, generator, uniform, weighted};
@@ -48,11 +49,12 @@ pub struct PartOptions {
     /// Most holes of a part, min-holes to 100 [default: 12]
     #[arg(long, default_value_t = Self::default().max_holes, hide_default_value = true)]
     pub max_holes: usize,
-    /// Parts of fewer vertices are left out, but for those in the layout of SHREC'16; the built-in model's network takes 200
-    /// eigenpairs of each [default: 0]
+    /// Parts of fewer vertices are left out, but for those in the layout of SHREC'16; the built-in model's network
+    /// takes 200 eigenpairs of each [default: 0]
     #[arg(long, default_value_t = Self::default().min_vertices, hide_default_value = true)]
     pub min_vertices: usize,
-    /// Test parts of each kind and class in the layout of SHREC'16, besides the 10 for training, 1 to 10000 [default: 20]
+    /// Test parts of each kind and class in the layout of SHREC'16, besides the 10 for training, 1 to 10000 [default:
+    /// 20]
     #[arg(long, default_value_t = Self::default().test_parts, hide_default_value = true)]
     pub test_parts: usize,
     /// Another seed, other parts [default: 0]
@@ -107,8 +109,8 @@ pub struct Part {
 /// Cuts that are tried for one part before the range of areas is given up.
 const TRIES: usize = 200;
 
-/// A connected part of `mesh`, whose share of the area is uniform in the range of the options as far as the shape allows.
-/// `index` is the part's number: another one, another cut.
+/// A connected part of `mesh`, whose share of the area is uniform in the range of the options as far as the shape
+/// allows. `index` is the part's number: another one, another cut.
 ///
 /// # Errors
 /// If an option is out of range, or no part of such a size was found in 200 tries.

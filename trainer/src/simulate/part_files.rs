@@ -1,4 +1,5 @@
-//! Parts in the layout of SHREC'16: `null/CLASS.off`, `holes/holes_CLASS_shape_N.off` with `.baryc_gt`, likewise `cuts`.
+//! Parts in the layout of SHREC'16: `null/CLASS.off`, `holes/holes_CLASS_shape_N.off` with `.baryc_gt`, likewise
+//! `cuts`.
 
 use super::folder::{claim, save};
 use super::surface_part_files::write_surface_parts;
@@ -23,14 +24,15 @@ struct Job<'a> {
 
 /// Writes parts of the shapes of a dataset, and says how many there are.
 ///
-/// Where shapes share a triangulation, in the layout of SHREC'16: each group is a class, with at least three shapes in vertex to vertex
-/// correspondence, as in TOSCA: the first by name is the whole, in its pose; the first half of the others gives the 10 training parts, which come first, and the second half the
-/// test parts, so that these share neither pose nor cut with the training parts. Other shapes are written as they are with a part of
-/// each kind beside them, `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and a manifest that keeps groups and splits.
+/// Where shapes share a triangulation, in the layout of SHREC'16: each group is a class, with at least three shapes
+/// in vertex to vertex correspondence, as in TOSCA: the first by name is the whole, in its pose; the first half of
+/// the others gives the 10 training parts, which come first, and the second half the test parts, so that these share
+/// neither pose nor cut with the training parts. Other shapes are written as they are with a part of each kind beside
+/// them, `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and a manifest that keeps groups and splits.
 ///
 /// # Errors
-/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be read or
-/// cut, or a file cannot be written.
+/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be
+/// read or cut, or a file cannot be written.
 pub fn write_parts(
     dataset: &Dataset,
     out: &Path,
@@ -102,8 +104,8 @@ fn jobs<'a>(dataset: &'a Dataset, options: &PartOptions) -> Result<Vec<Job<'a>>,
     Ok(jobs)
 }
 
-/// For each vertex of the part, a face of the whole (1-based) with it, and the weights of its corners; `None` where a vertex is
-/// in no face of the whole.
+/// For each vertex of the part, a face of the whole (1-based) with it, and the weights of its corners; `None` where a
+/// vertex is in no face of the whole.
 fn ground_truth(part: &Part, whole: &Mesh) -> Option<String> {
     let mut face_of = vec![None; whole.n_vertices()];
     for (f, face) in whole.faces().iter().enumerate() {

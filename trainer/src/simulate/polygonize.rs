@@ -1,6 +1,6 @@
-//! Level sets of a sampled function as triangles, by marching cubes (Lorensen and Cline 1987). Where a face of a cube is crossed
-//! four times its inside corners are taken to be apart, in both cubes that share it, so that the surface is always a closed
-//! manifold.
+//! Level sets of a sampled function as triangles, by marching cubes (Lorensen and Cline 1987). Where a face of a cube
+//! is crossed four times its inside corners are taken to be apart, in both cubes that share it, so that the surface
+//! is always a closed manifold.
 
 use super::volume::Volume;
 use fmnet::Mesh;
@@ -102,10 +102,12 @@ impl Surface<'_> {
     }
 }
 
-/// The polygons in which the surface crosses a cube, each as the edges of the cube that it crosses, counter-clockwise from outside.
+/// The polygons in which the surface crosses a cube, each as the edges of the cube that it crosses, counter-clockwise
+/// from outside.
 fn polygons(inside: [bool; 8]) -> Vec<Vec<Edge>> {
-    // Around a face each edge by which one comes in is followed by one by which one leaves again; the inside corners between them
-    // are cut off by the line from the one to the other. Every crossed edge is come in by in one of its two faces.
+    // Around a face each edge by which one comes in is followed by one by which one leaves again; the inside corners
+    // between them are cut off by the line from the one to the other. Every crossed edge is come in by in one of its
+    // two faces.
     let mut next: Vec<(Edge, Edge)> = Vec::new();
     for face in FACES {
         let crossed: Vec<(Edge, bool)> = (0..4)

@@ -1,8 +1,9 @@
 //! What a 3D scanner would have made of a registered shape.
 //!
-//! The registration is rounded between its vertices, its volume is sampled on a turned grid, parts that nearly touch grow together ([`ScanOptions::contact`]), and
-//! the surface is polygonised and decimated: nothing of the template's connectivity remains. What no camera sees is left open
-//! in part, further holes are made, the surface gets noise, and a few stray pieces float around it.
+//! The registration is rounded between its vertices, its volume is sampled on a turned grid, parts that nearly touch
+//! grow together ([`ScanOptions::contact`]), and the surface is polygonised and decimated: nothing of the template's
+//! connectivity remains. What no camera sees is left open in part, further holes are made, the surface gets noise,
+//! and a few stray pieces float around it.
 
 use super::carve::{carve, disc, largest_component, patches};
 use super::polygonize::polygonize;
@@ -45,16 +46,16 @@ pub struct ScanOptions {
     /// Vertices before holes are made, 500 to 60000 [default: 15000, the size that training decimates scans to]
     #[arg(long, default_value_t = Self::default().vertices, hide_default_value = true)]
     pub vertices: usize,
-    /// Spacing of the grid that the shape is sampled on, at most, relative to sqrt(area), 0.0015 to 0.05; what is thinner is lost
-    /// [default: 0.0045, half a child's finger]
+    /// Spacing of the grid that the shape is sampled on, at most, relative to sqrt(area), 0.0015 to 0.05; what is
+    /// thinner is lost [default: 0.0045, half a child's finger]
     #[arg(long, default_value_t = Self::default().detail, hide_default_value = true)]
     pub detail: f64,
     /// Surfaces that come nearer than this, relative to sqrt(area), grow together, as a hand on a hip; 0 (none) to 0.05
     /// [default: 0.01, on a person a finger's width]
     #[arg(long, default_value_t = Self::default().contact, hide_default_value = true)]
     pub contact: f64,
-    /// Share of the patches hidden from all cameras, as the soles of the feet, that stay open, 0 to 1; a scanner's software
-    /// fills the others [default: 0.6]
+    /// Share of the patches hidden from all cameras, as the soles of the feet, that stay open, 0 to 1; a scanner's
+    /// software fills the others [default: 0.6]
     #[arg(long, default_value_t = Self::default().hidden, hide_default_value = true)]
     pub hidden: f64,
     /// The axis that leads away from the floor; the cameras stand around it [default: y, as in FAUST]
@@ -121,10 +122,12 @@ const CELLS_PER_EDGE: f64 = 2.0;
 /// Largest turn of the grid against the shape, in radians; more would waste memory on a longer box.
 const TURN: f64 = 0.4;
 
-/// A scan of the closed surface `registration`, in the same place. `index` is the shape's number: another one, other damage.
+/// A scan of the closed surface `registration`, in the same place. `index` is the shape's number: another one, other
+/// damage.
 ///
-/// The registration may pass through itself. The scan may have holes, several components and vertices that are not manifold;
-/// each vertex of the registration corresponds with the nearest vertex of the scan, where there is one near.
+/// The registration may pass through itself. The scan may have holes, several components and vertices that are not
+/// manifold; each vertex of the registration corresponds with the nearest vertex of the scan, where there is one
+/// near.
 ///
 /// # Errors
 /// If an option is out of range, the surface is not closed or encloses nothing, or it cannot be decimated.
@@ -164,8 +167,8 @@ fn remesh(
     Ok(decimate(&dense, options.vertices, &DecimateOptions::default())?.mesh)
 }
 
-/// The surface of the shape's volume on a turned grid of spacing `cell`, in which surfaces nearer than `contact` have grown
-/// together: its largest component.
+/// The surface of the shape's volume on a turned grid of spacing `cell`, in which surfaces nearer than `contact` have
+/// grown together: its largest component.
 pub(super) fn solid(
     mesh: &Mesh,
     cell: f64,
@@ -213,7 +216,8 @@ fn open(mesh: &Mesh, options: &ScanOptions, unit: f64, rng: &mut ChaCha8Rng) -> 
     if open.n_faces() == 0 { mesh.clone() } else { open }
 }
 
-/// Moves the vertices along their normals by noise that neighbours share in part, as smoothing by the scanner leaves it.
+/// Moves the vertices along their normals by noise that neighbours share in part, as smoothing by the scanner leaves
+/// it.
 pub(super) fn roughen(mesh: &Mesh, deviation: f64, rng: &mut ChaCha8Rng) -> Result<Mesh, SimulateError> {
     let white: Vec<f64> = (0..mesh.n_vertices()).map(|_| normal(rng)).collect();
     let adjacency = Topology::new(mesh).adjacency();
@@ -231,8 +235,8 @@ pub(super) fn roughen(mesh: &Mesh, deviation: f64, rng: &mut ChaCha8Rng) -> Resu
     Ok(Mesh::new(vertices, mesh.faces().to_vec()).expect("finite displacements keep a mesh valid"))
 }
 
-/// With copies of small patches beside the surface: what a scanner makes of reflections and hair. Their radii are in the given
-/// range. The faces of the surface come first.
+/// With copies of small patches beside the surface: what a scanner makes of reflections and hair. Their radii are in
+/// the given range. The faces of the surface come first.
 pub(super) fn with_pieces(mesh: Mesh, count: usize, radii: [f64; 2], rng: &mut ChaCha8Rng) -> Mesh {
     let (adjacency, areas, normals) =
         (Topology::new(&mesh).adjacency(), mesh.vertex_areas(), vertex_normals(&mesh));

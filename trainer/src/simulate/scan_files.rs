@@ -9,12 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Writes a scan of every shape of the given splits, beside its registration, and says how many there are.
 ///
-/// The dataset must be one group of closed shapes in vertex to vertex correspondence, as the registrations of FAUST or SCAPE.
-/// A shape named `tr_reg_NNN` keeps its number; others are numbered so that they stay in their split.
+/// The dataset must be one group of closed shapes in vertex to vertex correspondence, as the registrations of FAUST
+/// or SCAPE. A shape named `tr_reg_NNN` keeps its number; others are numbered so that they stay in their split.
 ///
 /// # Errors
-/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be read or
-/// scanned, or a file cannot be written.
+/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be
+/// read or scanned, or a file cannot be written.
 pub fn write_scans(
     dataset: &Dataset,
     splits: &[Split],

@@ -9,8 +9,8 @@ use std::collections::HashMap;
 const MOST: f64 = 0.15;
 
 /// Splits every triangle in four. The new vertices lie on curves through the old ones, perpendicular to their normals
-/// (Vlachos et al. 2001, Curved PN triangles: the middle of a cubic edge), so that the facets of the mesh, which would tell
-/// where its vertices were, turn into a rounded surface of no smaller volume.
+/// (Vlachos et al. 2001, Curved PN triangles: the middle of a cubic edge), so that the facets of the mesh, which
+/// would tell where its vertices were, turn into a rounded surface of no smaller volume.
 pub(super) fn refine(mesh: &Mesh) -> Mesh {
     let normals = vertex_normals(mesh);
     let mut vertices = mesh.vertices().to_vec();

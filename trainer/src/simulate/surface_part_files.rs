@@ -1,5 +1,5 @@
-//! Parts of shapes that have triangulations of their own: `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`, and
-//! `dataset.toml`.
+//! Parts of shapes that have triangulations of their own: `shapes/NAME.ply` and `shapes/NAME_KIND.ply` with `.corr`,
+//! and `dataset.toml`.
 
 use super::folder::{SHAPES, check_names, claim, save_with_points, surface_entry};
 use super::{Part, PartOptions, SimulateError, SimulateProgress, cut_part};

@@ -20,14 +20,16 @@ struct Landmarks {
     shape: String,
 }
 
-/// Writes a triangulation, or several, of every shape of the given splits, and says how many there are. Groups and splits are kept.
+/// Writes a triangulation, or several, of every shape of the given splits, and says how many there are. Groups and
+/// splits are kept.
 ///
 /// Points are the dataset's own: all vertices where shapes share a triangulation, else its landmarks; of more than
-/// [`TriangulationOptions::landmarks`], as many are chosen, evenly over the group's first shape. The manifest is written last.
+/// [`TriangulationOptions::landmarks`], as many are chosen, evenly over the group's first shape. The manifest is
+/// written last.
 ///
 /// # Errors
-/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be read or
-/// triangulated, or a file cannot be written.
+/// If an option is out of range, the dataset does not fit, the folder holds another simulation, a shape cannot be
+/// read or triangulated, or a file cannot be written.
 pub fn write_triangulations(
     dataset: &Dataset,
     splits: &[Split],

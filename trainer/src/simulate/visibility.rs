@@ -19,8 +19,8 @@ const GRAZING: f64 = 0.2;
 /// How far behind the front a vertex may lie and still be seen, relative to sqrt(area).
 const DEPTH: f64 = 0.006;
 
-/// Whether each vertex is seen by some camera, `[n]`. The floor is the plane below the lowest vertex; `turn` (radians) turns the
-/// cameras about the axis `up`, a unit vector.
+/// Whether each vertex is seen by some camera, `[n]`. The floor is the plane below the lowest vertex; `turn`
+/// (radians) turns the cameras about the axis `up`, a unit vector.
 pub(super) fn seen(mesh: &Mesh, normals: &[Vec3], up: Vec3, turn: f64) -> Vec<bool> {
     let cameras = cameras(mesh, up, turn);
     let per_camera: Vec<Vec<bool>> = cameras.par_iter().map(|camera| camera.sees(mesh, normals)).collect();

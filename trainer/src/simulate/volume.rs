@@ -1,7 +1,7 @@
 //! The signed distance to a closed surface on a regular grid, in a band around it.
 //!
-//! The surface may pass through itself, as registrations do where skin touches skin: inside is where it winds around a point
-//! at least once, so that the outside is what a scanner would see.
+//! The surface may pass through itself, as registrations do where skin touches skin: inside is where it winds around
+//! a point at least once, so that the outside is what a scanner would see.
 
 use super::polygonize::crossings;
 use fmnet::Mesh;
@@ -76,7 +76,8 @@ impl Volume {
         }
     }
 
-    /// Makes the values negative where the surface winds around a node, by its crossings of each grid line of the last axis.
+    /// Makes the values negative where the surface winds around a node, by its crossings of each grid line of the
+    /// last axis.
     fn sign(&self, triangles: &[[Vec3; 3]], first: usize, values: &mut [f32]) {
         let [_, ny, nz] = self.size;
         let end = first + values.len() / (ny * nz);
@@ -114,8 +115,8 @@ impl Volume {
     /// Fills what is outside but out of reach for a ball of the given radius: the morphological closing. Two surfaces
     /// that come nearer than twice the radius grow together; elsewhere nothing changes.
     pub(super) fn close(&mut self, radius: f64) {
-        // The ball's centre may be wherever the distance is at least the radius; the shape closed is what is farther than
-        // the radius from all such places. Only the nearest of them matter, those on the level set itself.
+        // The ball's centre may be wherever the distance is at least the radius; the shape closed is what is farther
+        // than the radius from all such places. Only the nearest of them matter, those on the level set itself.
         let reach = radius + 2.0 * self.cell;
         let centers = crossings(self, radius as f32);
         let [_, ny, nz] = self.size;
@@ -162,9 +163,10 @@ fn crossing([a, b, c]: &[Vec3; 3], x: f64, y: f64) -> Option<(f64, i32)> {
     Some(((u.0 * a[2] + v.0 * b[2] + w.0 * c[2]) / sum, -turns[0]))
 }
 
-/// Twice the signed area of `p`, `q` and `(x, y)`, and its sign: 1 where the point is on the left of the edge. A point on the edge
-/// counts as moved a little along the first axis, and less along the second, so that a line through an edge or a vertex
-/// crosses exactly one of the triangles there (Edelsbrunner and Muecke 1990, Simulation of simplicity).
+/// Twice the signed area of `p`, `q` and `(x, y)`, and its sign: 1 where the point is on the left of the edge. A
+/// point on the edge counts as moved a little along the first axis, and less along the second, so that a line through
+/// an edge or a vertex crosses exactly one of the triangles there (Edelsbrunner and Muecke 1990, Simulation of
+/// simplicity).
 fn side(p: &Vec3, q: &Vec3, x: f64, y: f64) -> (f64, i32) {
     // Taken from the edge's lower end, so that the two triangles at it compute the same number.
     if (p[0], p[1]) > (q[0], q[1]) {

@@ -17,8 +17,8 @@ use super::{SynthError, SynthOptions, UNMATCHED};
 pub struct Body {
     /// The surface, closed unless damaged.
     pub mesh: Mesh,
-    /// Of every landmark of the family its vertex, `[n_landmarks]`, or [`UNMATCHED`] where the breed does not have it or damage
-    /// took it away.
+    /// Of every landmark of the family its vertex, `[n_landmarks]`, or [`UNMATCHED`] where the breed does not have it
+    /// or damage took it away.
     pub landmarks: Vec<u32>,
     /// Of every vertex the vertex of the template's dense surface ([`Template::rest_mesh`]) it is, `[n]`.
     pub template_vertices: Vec<u32>,

@@ -1,7 +1,7 @@
 //! Indices of the bones of a family.
 
-/// Defines the indices of bones in the order in which they are added: those of the trunk, those of the left side, each of which
-/// has a right one, and those added last. `COUNT` is the number of all; [`limb`] names those of a side.
+/// Defines the indices of bones in the order in which they are added: those of the trunk, those of the left side,
+/// each of which has a right one, and those added last. `COUNT` is the number of all; [`limb`] names those of a side.
 macro_rules! bones {
     ($($trunk:ident)*; $($paired:ident)*; $($last:ident)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]

@@ -34,8 +34,8 @@ impl Carriers {
     }
 }
 
-/// Where `p` goes when the solid `from` becomes `to`, which is of the same kind: it keeps its place along the solid and its
-/// distance from the axis relative to the radius there.
+/// Where `p` goes when the solid `from` becomes `to`, which is of the same kind: it keeps its place along the solid
+/// and its distance from the axis relative to the radius there.
 fn carry(from: &Solid, to: &Solid, p: Vec3) -> Vec3 {
     match (from, to) {
         (Solid::Tube(from), Solid::Tube(to)) => from.carry(to, p),

@@ -12,7 +12,8 @@ use super::recipe::Recipe;
 
 /// Newton steps that bring a carried point onto the surface.
 const STEPS: usize = 14;
-/// Cosine between the normal that a landmark is carried with and the one it finds, below which it is covered by something else.
+/// Cosine between the normal that a landmark is carried with and the one it finds, below which it is covered by
+/// something else.
 const AGREEMENT: f64 = 0.35;
 /// Two landmarks closer than this share of their distance on the base have run into one place.
 const CROWDED: f64 = 0.2;
@@ -44,11 +45,11 @@ impl Landmarks {
         Self { parts, points, normals, carriers, nearest, cell, symmetry }
     }
 
-    /// Where the landmarks are on the surface of `parts`, whose first ones are those of the base body in other proportions:
-    /// `None` where another part covers them.
+    /// Where the landmarks are on the surface of `parts`, whose first ones are those of the base body in other
+    /// proportions: `None` where another part covers them.
     ///
-    /// Each landmark goes with the solids it is on, then straight to the surface. It is lost where the surface there looks
-    /// elsewhere, or where it runs into its neighbour.
+    /// Each landmark goes with the solids it is on, then straight to the surface. It is lost where the surface there
+    /// looks elsewhere, or where it runs into its neighbour.
     pub(super) fn on(&self, parts: &[Part], scale: f64) -> Vec<Option<Vec3>> {
         let cell = scale * self.cell;
         let found: Vec<Option<Vec3>> = (0..self.points.len())

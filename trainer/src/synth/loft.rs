@@ -47,8 +47,8 @@ impl Loft {
         if gradient > 0.0 { (level * (level - 1.0) / gradient).max(-least) } else { -least }
     }
 
-    /// Where `p` goes when this tube becomes `to`, which has as many stations: it keeps its place along the tube and its
-    /// distance from the centre relative to the extents there.
+    /// Where `p` goes when this tube becomes `to`, which has as many stations: it keeps its place along the tube and
+    /// its distance from the centre relative to the extents there.
     pub(super) fn carry(&self, to: &Self, p: Vec3) -> Vec3 {
         let (along, depth) = self.axes();
         let (i, t, beyond) = self.locate(p[along]);

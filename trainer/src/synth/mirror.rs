@@ -1,5 +1,5 @@
-//! Bodies that are their own mirror image at the plane x = 0, and those that are not: which points, vertices and bones are
-//! each other's.
+//! Bodies that are their own mirror image at the plane x = 0, and those that are not: which points, vertices and
+//! bones are each other's.
 
 use fmnet::mesh::nearest_vertices;
 
@@ -61,8 +61,8 @@ pub(super) fn mirrored([x, y, z]: Vec3) -> Vec3 {
     [-x, y, z]
 }
 
-/// Of every vertex the one at its mirror image. Both are then exactly mirror images: the right one of two is moved, by rounding
-/// errors only.
+/// Of every vertex the one at its mirror image. Both are then exactly mirror images: the right one of two is moved,
+/// by rounding errors only.
 pub(super) fn pair_up(points: &mut [Vec3]) -> Vec<u32> {
     let images: Vec<Vec3> = points.iter().map(|&p| mirrored(p)).collect();
     let twins = nearest_vertices(points, &images);

@@ -1,11 +1,11 @@
-//! Synthetic bodies: articulated bipeds, quadrupeds, hands, birds, fish and insects of several species, in random shapes and poses,
-//! with exact correspondences. They train the model that needs no licensed data.
+//! Synthetic bodies: articulated bipeds, quadrupeds, hands, birds, fish and insects of several species, in random
+//! shapes and poses, with exact correspondences. They train the model that needs no licensed data.
 //!
-//! A breed of a species is modelled at rest as an implicit surface ([`Species`]), polygonised ([`Template`]) and deformed
-//! into individuals ([`Template::body`]): bones are lengthened and thickened, flesh is added, and dual quaternion
-//! skinning (Kavan et al. 2008) puts the body into a pose. Each individual is triangulated anew, so that neither the
-//! order of vertices nor the connectivity tells which points correspond. The landmarks of a [`Family`] are found on each breed by
-//! carrying them with the solids that the surface is made of.
+//! A breed of a species is modelled at rest as an implicit surface ([`Species`]), polygonised ([`Template`]) and
+//! deformed into individuals ([`Template::body`]): bones are lengthened and thickened, flesh is added, and dual
+//! quaternion skinning (Kavan et al. 2008) puts the body into a pose. Each individual is triangulated anew, so that
+//! neither the order of vertices nor the connectivity tells which points correspond. The landmarks of a [`Family`]
+//! are found on each breed by carrying them with the solids that the surface is made of.
 
 mod adjacency;
 mod biped;

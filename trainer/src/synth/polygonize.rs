@@ -241,8 +241,8 @@ impl Grid {
         Block { active, inside: value < 0.0, values, ..Block::default() }
     }
 
-    /// Values at the block's own corners. A corner on the right is judged by the parts of the block that owns its mirror image,
-    /// so that both have the same value.
+    /// Values at the block's own corners. A corner on the right is judged by the parts of the block that owns its
+    /// mirror image, so that both have the same value.
     fn values(&self, parts: &[Part], blocks: &[Block], b: usize) -> Vec<f64> {
         let place = self.place(b);
         let width = self.blocks[0] * BLOCK;
@@ -399,8 +399,8 @@ fn sheets(values: &[f64], cell: [usize; 3]) -> Vec<Vec<u8>> {
     result.into_iter().map(|(_, edges)| edges).collect()
 }
 
-/// Where a field of these values at the ends of an edge crosses zero, from 0 to 1. Far from the surface the field is infinite:
-/// the crossing then is at the other end.
+/// Where a field of these values at the ends of an edge crosses zero, from 0 to 1. Far from the surface the field is
+/// infinite: the crossing then is at the other end.
 fn crossing(low: f64, high: f64) -> f64 {
     match (low.is_finite(), high.is_finite()) {
         (true, true) => low / (low - high),

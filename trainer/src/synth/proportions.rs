@@ -1,10 +1,11 @@
 //! Proportions of bodies: numbers that vary from species to species and from breed to breed.
 
-/// Defines `Proportions`: for each field its default and how much it varies, as the deviation of its logarithm, or of itself
-/// where the default is 0.
+/// Defines `Proportions`: for each field its default and how much it varies, as the deviation of its logarithm, or of
+/// itself where the default is 0.
 macro_rules! proportions {
     ($($(#[$doc:meta])* $field:ident = $default:expr, $spread:expr;)*) => {
-        /// Proportions of a species or breed, relative to the typical body's (1, or 0 for what it lacks) unless said otherwise.
+        /// Proportions of a species or breed, relative to the typical body's (1, or 0 for what it lacks) unless said
+        /// otherwise.
         #[derive(Clone, Copy, Debug)]
         pub(super) struct Proportions { $($(#[$doc])* pub(super) $field: f64,)* }
 

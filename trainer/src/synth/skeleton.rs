@@ -44,8 +44,8 @@ impl Skeleton {
         }
     }
 
-    /// Appends the given bones of the left side, then their mirror images: `NAME_left`, `NAME_right`. A parent is a bone that
-    /// is already there, or one of the same side.
+    /// Appends the given bones of the left side, then their mirror images: `NAME_left`, `NAME_right`. A parent is a
+    /// bone that is already there, or one of the same side.
     pub(super) fn add_pairs(&mut self, bones: &[(&str, usize, Vec3, Vec3, f64)]) {
         let first = self.len();
         for (side, side_name) in ["left", "right"].into_iter().enumerate() {

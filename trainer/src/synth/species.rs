@@ -133,8 +133,8 @@ impl Species {
         100 * self.family as usize + self.index
     }
 
-    /// The body of a breed: 0 has the typical proportions and wears nothing; others have proportions around these, or between
-    /// these and those of another species. Another `trial` draws anew.
+    /// The body of a breed: 0 has the typical proportions and wears nothing; others have proportions around these, or
+    /// between these and those of another species. Another `trial` draws anew.
     pub(super) fn recipe(self, breed: u64, trial: u8) -> Recipe {
         let mut rng = generator_of_trial(self.index(), breed, Purpose::Breed, trial);
         let plan = self.family.plan();

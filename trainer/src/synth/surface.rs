@@ -97,8 +97,9 @@ impl Surface {
         landmarks
     }
 
-    /// Landmarks spread evenly over the typical body: random vertices of the modelled side, none nearer to another or to its
-    /// image than a fixed distance, or half of it where the two look in opposite directions (as on both sides of a finger).
+    /// Landmarks spread evenly over the typical body: random vertices of the modelled side, none nearer to another or
+    /// to its image than a fixed distance, or half of it where the two look in opposite directions (as on both sides
+    /// of a finger).
     pub(super) fn landmarks(&self, recipe: &Recipe, rng: &mut impl Rng) -> Landmarks {
         let typical = BodyShape::typical(recipe);
         let rest = scale_bones(&recipe.skeleton, &self.influences, &self.points, &typical.scales);

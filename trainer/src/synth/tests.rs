@@ -118,8 +118,8 @@ fn templates_are_spheres_with_the_landmarks_of_their_family() {
     }
 }
 
-/// A landmark that the base body has on a bone's skin is on the same bone's skin in every species, or on a neighbour's. Short
-/// bones, as of a teddy's hands, share their skin with bones farther off.
+/// A landmark that the base body has on a bone's skin is on the same bone's skin in every species, or on a
+/// neighbour's. Short bones, as of a teddy's hands, share their skin with bones farther off.
 #[test]
 fn landmarks_stay_on_their_part_of_the_body() {
     // The bones of a penguin's short legs and neck, and of a beetle's waist, share their skin with all around.
@@ -288,7 +288,8 @@ fn other_seed_other_body_and_other_order() {
     assert!(share < 0.35, "{share} of the edges are the same");
 }
 
-/// Where a landmark is on the surface at rest does not depend on the individual; where it is on the body depends on the pose alone.
+/// Where a landmark is on the surface at rest does not depend on the individual; where it is on the body depends on
+/// the pose alone.
 #[test]
 fn landmarks_are_the_same_template_points_in_every_pose() {
     let template = Template::new(species("child"), 1);

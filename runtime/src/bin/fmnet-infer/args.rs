@@ -9,10 +9,12 @@ use std::path::{Path, PathBuf};
 
 /// Dense correspondence between deformable 3D shapes: two meshes in, a map out.
 ///
-/// A map gives every vertex of the source a vertex of the target. Meshes may be OFF, PLY, OBJ, glTF, GLB or STL, in any unit,
-/// with holes, several components and other defects; results are always in the vertices of the files as they are.
+/// A map gives every vertex of the source a vertex of the target. Meshes may be OFF, PLY, OBJ, glTF, GLB or STL, in
+/// any unit, with holes, several components and other defects; results are always in the vertices of the files as
+/// they are.
 ///
-/// Exit status: 0 success, 2 bad usage or bad input, 1 a failure of the program; with `match --strict` 3 for a doubtful map.
+/// Exit status: 0 success, 2 bad usage or bad input, 1 a failure of the program; with `match --strict` 3 for a
+/// doubtful map.
 #[derive(Debug, Parser)]
 #[command(name = "fmnet-infer", version, max_term_width = 110)]
 pub(crate) struct Cli {
@@ -72,8 +74,8 @@ pub(crate) struct ShapeArgs {
     /// Decimate larger meshes to so many vertices, 100 and up, or `off` [default: the model's; 15000 with SHOT]
     #[arg(long, value_name = "N|off", value_parser = resize)]
     pub(crate) decimate: Option<Resize>,
-    /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices [default:
-    /// 2000; off for features and for the refinements pmf and shared-triangulation]
+    /// Subdivide smaller meshes inside to so many vertices, 100 and up, or `off`; results stay in the file's vertices
+    /// [default: 2000; off for features and for the refinements pmf and shared-triangulation]
     #[arg(long, value_name = "N|off", value_parser = resize)]
     pub(crate) subdivide: Option<Resize>,
     /// SHOT radius relative to sqrt(area), between 0 and 1 [default: the model's; 0.067 with SHOT]
@@ -89,7 +91,8 @@ pub(crate) struct ShapeArgs {
 pub(crate) struct PipelineArgs {
     #[command(flatten)]
     pub(crate) shape: ShapeArgs,
-    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with SHOT]
+    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with
+    /// SHOT]
     #[arg(long, value_enum)]
     pub(crate) fm: Option<SolverKind>,
     /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 for bidirectional, else 0.1]
@@ -104,8 +107,8 @@ pub(crate) struct PipelineArgs {
     /// How many ways to a map are tried; the one that looks best is taken
     #[arg(long, value_enum, default_value = "normal")]
     pub(crate) effort: Effort,
-    /// Adapt the network to the pair by so many steps, 0 to 100, about half a second each; the map is taken if it looks better
-    /// [default: 10 where the first map is doubtful, else 0]
+    /// Adapt the network to the pair by so many steps, 0 to 100, about half a second each; the map is taken if it
+    /// looks better [default: 10 where the first map is doubtful, else 0]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=100))]
     pub(crate) adapt: Option<u16>,
 }
@@ -126,18 +129,18 @@ pub(crate) struct MatchArgs {
     /// Mesh that they are matched to
     pub(crate) target: PathBuf,
     /// Output; may be given several times. The extension decides: .txt (one 0-based target vertex a line, -1 where
-    /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence and the point on the target's surface), .npz
-    /// (the same as arrays), .ply or .glb (both meshes side by
-    /// side, coloured alike where they match), .png (a picture of that), .html (viewer)
+    /// unmatched), .vts (1-based), .npy (int32), .csv (source, target, confidence and the point on the target's
+    /// surface), .npz (the same as arrays), .ply or .glb (both meshes side by side, coloured alike where they match),
+    /// .png (a picture of that), .html (viewer)
     #[arg(short, long = "output", value_name = "MAP", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
-    /// The source is a part of a shape, with holes or cut off, and the target the whole, in whatever pose; both in the same
-    /// unit of length. Parts determine fewer eigenfunctions than wholes; where the map is doubtful, fewer are tried,
-    /// and other sizes of the part
+    /// The source is a part of a shape, with holes or cut off, and the target the whole, in whatever pose; both in
+    /// the same unit of length. Parts determine fewer eigenfunctions than wholes; where the map is doubtful, fewer
+    /// are tried, and other sizes of the part
     #[arg(long)]
     pub(crate) partial: bool,
-    /// Matches that are known, kept exactly, which pull the rest of the map: a text file with a source vertex and a target vertex a
-    /// line, 0-based, or one vertex that both have; # begins a comment
+    /// Matches that are known, kept exactly, which pull the rest of the map: a text file with a source vertex and a
+    /// target vertex a line, 0-based, or one vertex that both have; # begins a comment
     #[arg(long, value_name = "FILE")]
     pub(crate) landmarks: Option<PathBuf>,
     /// End with exit status 3 where the map is doubtful or mirrored; it is written all the same
@@ -153,11 +156,11 @@ pub(crate) struct MatchArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  fmnet-infer batch pairs.txt --root scans --out maps")]
 pub(crate) struct BatchArgs {
-    /// Text file with a pair of mesh files a line, separated by white space, a comma, a semicolon or a tab; names with spaces may stand in
-    /// quotes; # begins a comment. `-` is standard input
+    /// Text file with a pair of mesh files a line, separated by white space, a comma, a semicolon or a tab; names
+    /// with spaces may stand in quotes; # begins a comment. `-` is standard input
     pub(crate) pairs: PathBuf,
-    /// Folder for the maps, SOURCE__TARGET.EXT, each with a .key file that says what it was made from. A map that is there is
-    /// kept where both meshes, the model and every option are the same as then, else made anew
+    /// Folder for the maps, SOURCE__TARGET.EXT, each with a .key file that says what it was made from. A map that is
+    /// there is kept where both meshes, the model and every option are the same as then, else made anew
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Format of the maps
@@ -189,13 +192,13 @@ pub(crate) struct TransferArgs {
     /// source: each vertex from the source vertex whose match is nearest
     #[arg(long, value_enum, default_value = "source")]
     pub(crate) to: Receiver,
-    /// Per-vertex values of the giving mesh to carry over as well: scalar fields, skin weights or labels [n] or [n, q]
-    /// (.npy; integers are labels and never mixed), or landmarks (.txt, a 0-based vertex a line); each needs an output of
-    /// its extension
+    /// Per-vertex values of the giving mesh to carry over as well: scalar fields, skin weights or labels [n] or [n,
+    /// q] (.npy; integers are labels and never mixed), or landmarks (.txt, a 0-based vertex a line); each needs an
+    /// output of its extension
     #[arg(long, value_name = "FILE")]
     pub(crate) values: Vec<PathBuf>,
-    /// Output: the receiving mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file beside its own; or, for each
-    /// --values in turn, a file of the same kind (.npy, .txt)
+    /// Output: the receiving mesh (.ply, .obj, .glb, .off) with the attributes of the giving mesh file beside its
+    /// own; or, for each --values in turn, a file of the same kind (.npy, .txt)
     #[arg(short, long = "output", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
 }
@@ -212,9 +215,10 @@ pub(crate) enum Receiver {
 pub(crate) struct FeaturesArgs {
     /// The mesh
     pub(crate) mesh: PathBuf,
-    /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], what else the model takes (shot.npy [n,352],
-    /// gradients_x.npy and gradients_y.npy [n,k]) and its descriptors.npy [n,d]; without a model shot.npy alone. Where the mesh was repaired or decimated so that vertices differ from the
-    /// file's, also vertices.npy [n]: the file's vertex of each row. Files of an earlier run are replaced or removed
+    /// Folder for eigenvalues.npy [k], eigenvectors.npy [n,k], mass.npy [n], what else the model takes (shot.npy
+    /// [n,352], gradients_x.npy and gradients_y.npy [n,k]) and its descriptors.npy [n,d]; without a model shot.npy
+    /// alone. Where the mesh was repaired or decimated so that vertices differ from the file's, also vertices.npy
+    /// [n]: the file's vertex of each row. Files of an earlier run are replaced or removed
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
@@ -235,8 +239,8 @@ pub(crate) struct EvaluateArgs {
     /// Target mesh
     #[arg(long)]
     pub(crate) target: PathBuf,
-    /// `identity` (vertex i corresponds with vertex i), a map file, points on the target (.corr, .baryc_gt), or two .vts or .corr
-    /// files separated by a comma (line i of the one corresponds with line i of the other)
+    /// `identity` (vertex i corresponds with vertex i), a map file, points on the target (.corr, .baryc_gt), or two
+    /// .vts or .corr files separated by a comma (line i of the one corresponds with line i of the other)
     #[arg(long, value_name = "identity|FILE|FILE_A,FILE_B")]
     pub(crate) ground_truth: OsString,
     /// Second ground truth, the left-right mirrored one; the better of the two counts

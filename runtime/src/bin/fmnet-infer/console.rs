@@ -98,13 +98,14 @@ impl Console {
     }
 }
 
-/// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do without.
+/// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do
+/// without.
 pub(crate) fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// 1 where the program or the machine failed (a file that cannot be written, a solver that did not converge), 2 for bad usage
-/// or bad input.
+/// 1 where the program or the machine failed (a file that cannot be written, a solver that did not converge), 2 for
+/// bad usage or bad input.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
     if error.is::<crate::commands::Doubtful>() {
         return ExitCode::from(3);

@@ -4,10 +4,10 @@
 //! eigenvalue, z that of the smallest, y their cross product. The covariance determines an axis up to its sign; the
 //! side with the majority of the neighbours decides that.
 //!
-//! The authors' implementation departs from the paper, and so does this: the weight of a neighbour is the radius minus its
-//! *squared* distance, hence negative beyond the distance 3, and the covariance is divided by the sum of the weights,
-//! which is then mostly negative too. In a tie, the authors keep the sign that their eigensolver happened to
-//! return, which depends on how the mesh is rotated; [`break_tie`] does not.
+//! The authors' implementation departs from the paper, and so does this: the weight of a neighbour is the radius
+//! minus its *squared* distance, hence negative beyond the distance 3, and the covariance is divided by the sum of
+//! the weights, which is then mostly negative too. In a tie, the authors keep the sign that their eigensolver
+//! happened to return, which depends on how the mesh is rotated; [`break_tie`] does not.
 
 use std::array;
 

@@ -215,8 +215,8 @@ fn octant_fraction(a: f32, b: f32) -> f32 {
     ratio * (((high * s + 0.246_423_24) * s - 0.423_508_53) * s + 1.273_210_5)
 }
 
-/// The nearest integer to a number of 0 or more: adding 2^23 leaves no bits for a fraction. Unlike a cast, which treats NaN and
-/// overflow, this is a single operation on a register of many numbers.
+/// The nearest integer to a number of 0 or more: adding 2^23 leaves no bits for a fraction. Unlike a cast, which
+/// treats NaN and overflow, this is a single operation on a register of many numbers.
 #[inline(always)]
 fn nearest_integer(x: f32) -> i32 {
     const SHIFT: f32 = 8_388_608.0;

@@ -2,8 +2,8 @@
 //! for local surface description", ECCV 2010), as Litany et al. 2017 computed it for their network.
 //!
 //! A sphere around each vertex is oriented by a local frame ([`frame`]) and cut into 32 volumes: 8 sectors of
-//! azimuth, 2 halves of elevation, 2 shells of distance. Each volume holds a histogram of the cosine between the normals
-//! in it and the frame's z axis, filled with interpolation between adjacent volumes and bins ([`histogram`]).
+//! azimuth, 2 halves of elevation, 2 shells of distance. Each volume holds a histogram of the cosine between the
+//! normals in it and the frame's z axis, filled with interpolation between adjacent volumes and bins ([`histogram`]).
 //!
 //! The result agrees with the authors' implementation, which departs from the paper in places; each is stated
 //! where it is computed. One of them makes the descriptor depend on the unit of length, so everything here happens in

@@ -123,8 +123,8 @@ impl Grid {
         self.normals[point as usize]
     }
 
-    /// Collects the points within the radius of `vertex`, the bound included, `vertex` itself excluded. A vertex without
-    /// a normal has none.
+    /// Collects the points within the radius of `vertex`, the bound included, `vertex` itself excluded. A vertex
+    /// without a normal has none.
     #[inline(always)]
     pub(super) fn gather(&self, vertex: usize, out: &mut Neighborhood) {
         out.clear();

@@ -1,4 +1,5 @@
-//! Colours: linear in glTF (section 3.7.2.1 of the specification), sRGB in images and in every other format (IEC 61966-2-1).
+//! Colours: linear in glTF (section 3.7.2.1 of the specification), sRGB in images and in every other format (IEC
+//! 61966-2-1).
 
 /// The byte of sRGB that stands for a linear component.
 pub(super) fn srgb_byte(linear: f64) -> u8 {

@@ -60,8 +60,8 @@ impl Influences {
         skeleton.pose(position, || self.of(vertex))
     }
 
-    /// The four strongest joints of a vertex in the skeleton of the whole file, and whether there are more. With more the four weights are
-    /// scaled to a sum of 1; else they stay as they are.
+    /// The four strongest joints of a vertex in the skeleton of the whole file, and whether there are more. With more
+    /// the four weights are scaled to a sum of 1; else they stay as they are.
     pub(super) fn strongest(&self, vertex: usize, skeleton: &Skeleton) -> Parsed<([u16; 4], [f32; 4], bool)> {
         let missing = |joint: f64| {
             let joints: Vec<f64> = self.of(vertex).map(|(joint, _)| joint).collect();

@@ -20,8 +20,8 @@ pub(super) struct Look {
     pub(super) factor: [f64; 4],
 }
 
-/// Where texture coordinates come to lie in the image (KHR_texture_transform): scaled, then turned counter-clockwise as seen in the image,
-/// then moved.
+/// Where texture coordinates come to lie in the image (KHR_texture_transform): scaled, then turned counter-clockwise
+/// as seen in the image, then moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
     offset: [f64; 2],

@@ -1,9 +1,9 @@
 //! glTF 2.0 and GLB: the scene's triangles in world coordinates, several meshes and primitives one after another.
 //!
 //! The crate `gltf` gives the container and the data types; its accessors and iterators panic on indices and offsets
-//! that are out of range, so every reference is looked up with a check here. Skinned meshes are placed by their joints, as
-//! the specification (section 3.7.3.3) demands, morph targets applied with the weights that the file gives them; animations are not
-//! applied.
+//! that are out of range, so every reference is looked up with a check here. Skinned meshes are placed by their
+//! joints, as the specification (section 3.7.3.3) demands, morph targets applied with the weights that the file gives
+//! them; animations are not applied.
 
 mod accessor;
 mod color;

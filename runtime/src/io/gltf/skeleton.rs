@@ -60,8 +60,8 @@ impl Skeleton {
         self.joints.get(joint as usize).copied()
     }
 
-    /// The place in the world of a vertex that these joints move: linear blend skinning. `None` where a joint does not exist or nothing
-    /// moves it.
+    /// The place in the world of a vertex that these joints move: linear blend skinning. `None` where a joint does
+    /// not exist or nothing moves it.
     pub(super) fn pose<I: Iterator<Item = (f64, f32)>>(
         &self,
         position: [f64; 3],

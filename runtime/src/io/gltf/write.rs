@@ -1,5 +1,5 @@
-//! Writing GLB: one mesh of one primitive, everything in the binary chunk. Positions are in single precision, of a mesh far from the origin
-//! relative to its middle, which is then the place of its node.
+//! Writing GLB: one mesh of one primitive, everything in the binary chunk. Positions are in single precision, of a
+//! mesh far from the origin relative to its middle, which is then the place of its node.
 
 mod buffer;
 mod seams;
@@ -70,7 +70,8 @@ pub(in crate::io) fn encode(path: &Path, mesh: &Mesh, attributes: &Attributes) -
     buffer.into_glb().map_err(unwritable)
 }
 
-/// On each axis along which the mesh is so far from the origin that single precision would show, a place near the middle of the mesh; else
+/// On each axis along which the mesh is so far from the origin that single precision would show, a place near the
+/// middle of the mesh; else
 /// 0. It is a multiple of a power of two, so that its few decimals say it exactly to readers of either precision.
 fn far_place(mesh: &Mesh) -> [f64; 3] {
     /// In diagonals of the mesh. At this distance coordinates are off by a millionth of the diagonal.
@@ -156,7 +157,8 @@ fn primitive(
     })
 }
 
-/// Adds colours: eight bits where they bring every colour back, else sixteen, since dark ones are close together in linear light.
+/// Adds colours: eight bits where they bring every colour back, else sixteen, since dark ones are close together in
+/// linear light.
 fn linear_colors(buffer: &mut Buffer, split: &Split, colors: &[[u8; 4]]) -> Index<Accessor> {
     let is_fine = colors.iter().any(|c| !c[..3].iter().all(|&x| color::fits_a_byte(x)));
     let components = Type::Vec4;
@@ -180,7 +182,8 @@ enum Image<'a> {
     Uri(String),
 }
 
-/// The image's bytes where it is a PNG or JPEG file that can be read, else a reference; `None` where there is no such file.
+/// The image's bytes where it is a PNG or JPEG file that can be read, else a reference; `None` where there is no such
+/// file.
 fn image<'a>(texture: &'a Texture, path: &Path) -> Result<Option<Image<'a>>, IoError> {
     let bytes: Cow<'a, [u8]> = match texture {
         Texture::Embedded { bytes, .. } => bytes.into(),

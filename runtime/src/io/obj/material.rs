@@ -178,7 +178,8 @@ pub(super) fn count_other_images(
     }
 }
 
-/// Gives the vertices the colours of the materials around them, unless these are one shade of grey, which is no more than a default.
+/// Gives the vertices the colours of the materials around them, unless these are one shade of grey, which is no more
+/// than a default.
 pub(super) fn spread_colors(found: &[Option<Material>], runs: &[(usize, usize)], builder: &mut MeshBuilder) {
     let diffuse = |i: usize| found.get(i).and_then(Option::as_ref).and_then(|m| m.diffuse);
     let mut colors: Vec<[f32; 3]> = (0..found.len()).filter_map(diffuse).collect();

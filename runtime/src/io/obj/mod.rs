@@ -1,8 +1,8 @@
-//! Wavefront OBJ: vertices in file order, with colours behind the coordinates (or in `#MRGB` lines, as ZBrush writes them); polygons with
-//! texture coordinates.
+//! Wavefront OBJ: vertices in file order, with colours behind the coordinates (or in `#MRGB` lines, as ZBrush writes
+//! them); polygons with texture coordinates.
 //!
-//! Parsed here: `tobj` renumbers the vertices of each object by first use and drops those that no face uses, but vertex `i` of
-//! the file must stay vertex `i`; and it panics on some material libraries.
+//! Parsed here: `tobj` renumbers the vertices of each object by first use and drops those that no face uses, but
+//! vertex `i` of the file must stay vertex `i`; and it panics on some material libraries.
 
 mod material;
 mod write;

@@ -47,7 +47,8 @@ impl Colors {
         })
     }
 
-    /// The colours as bytes. Whole numbers are full at 255, or at 65535 where one is larger; others at 1, or at 255 where one is larger.
+    /// The colours as bytes. Whole numbers are full at 255, or at 65535 where one is larger; others at 1, or at 255
+    /// where one is larger.
     pub(super) fn to_bytes(&self) -> Vec<[u8; 4]> {
         let largest = |components: std::ops::Range<usize>| {
             let values = self.values.iter().flat_map(|c| &c[components.clone()]).copied();

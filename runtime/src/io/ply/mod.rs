@@ -1,8 +1,8 @@
 //! Polygon File Format (Turk 1994): text and both binary byte orders, any further elements and properties.
 //!
 //! Kept are positions, colours, texture coordinates (per vertex, or per corner as the list `texcoord`), the image
-//! named by a `TextureFile` comment, and every other scalar property of the vertices as a field. Colours of faces become colours of the
-//! vertices. Normals are not kept.
+//! named by a `TextureFile` comment, and every other scalar property of the vertices as a field. Colours of faces
+//! become colours of the vertices. Normals are not kept.
 
 mod columns;
 mod header;
@@ -81,8 +81,8 @@ fn texture(names: &[Vec<u8>], image_of_face: &[u32], folder: &Path, builder: &mu
     }
 }
 
-/// Reads all elements into the builder; returns the texture coordinates per vertex and the number of each triangle's image, if there are
-/// any.
+/// Reads all elements into the builder; returns the texture coordinates per vertex and the number of each triangle's
+/// image, if there are any.
 #[allow(clippy::type_complexity)]
 fn read_body<S: Source>(
     mut source: S,

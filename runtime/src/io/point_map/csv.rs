@@ -65,7 +65,8 @@ struct Table {
     columns: Columns,
 }
 
-/// Where the columns after source and target stand; without a line that names them, confidence and point follow in this order.
+/// Where the columns after source and target stand; without a line that names them, confidence and point follow in
+/// this order.
 struct Columns {
     confidence: Option<usize>,
     point: [Option<usize>; 4],

@@ -61,21 +61,23 @@ impl PointMapFormat {
     }
 }
 
-/// Reads a point map; the extension decides on the format, but NumPy's `.npy` is known by its first bytes. Text may be in UTF-8 or UTF-16.
+/// Reads a point map; the extension decides on the format, but NumPy's `.npy` is known by its first bytes. Text may
+/// be in UTF-8 or UTF-16.
 ///
 /// `n_target` is the number of target vertices, against which every index is checked; where it is `None` it is
 /// what the file states (`.csv`), else one more than the largest index.
 ///
 /// # Errors
-/// If the file cannot be read, its extension is none of [`PointMapFormat::EXTENSIONS`], a line or entry is no index of a
-/// target vertex, or a `.csv` states another number of targets than `n_target`.
+/// If the file cannot be read, its extension is none of [`PointMapFormat::EXTENSIONS`], a line or entry is no index
+/// of a target vertex, or a `.csv` states another number of targets than `n_target`.
 pub fn read_point_map(path: &Path, n_target: Option<usize>) -> Result<PointMap, IoError> {
     let format = PointMapFormat::of(path)?;
     let bytes = std::fs::read(path).map_err(|source| IoError::Read { path: path.into(), source })?;
     decode(&bytes, format, n_target).map_err(|e| e.in_file(path))
 }
 
-/// Writes a point map; the extension decides on the format. Confidences, points and followers are kept by `.csv` and `.npz` only.
+/// Writes a point map; the extension decides on the format. Confidences, points and followers are kept by `.csv` and
+/// `.npz` only.
 ///
 /// # Errors
 /// If the extension is none of [`PointMapFormat::EXTENSIONS`], the file cannot be written, or an index does not fit

@@ -7,8 +7,8 @@ use crate::mesh::SurfacePoint;
 use crate::point_map::PointMap;
 use std::path::Path;
 
-/// `targets` int32 `[n]`, `confidence` float32 `[n]`, `faces` int32 `[n]`, `weights` float64 `[n, 3]`, `followers` int32 `[m]`: what the
-/// map has of them.
+/// `targets` int32 `[n]`, `confidence` float32 `[n]`, `faces` int32 `[n]`, `weights` float64 `[n, 3]`, `followers`
+/// int32 `[m]`: what the map has of them.
 pub(super) fn encode(path: &Path, map: &PointMap) -> Result<Vec<u8>, IoError> {
     let index = |value: Option<u32>| value.map_or(Some(-1), |value| i32::try_from(value).ok());
     let faces =

@@ -78,8 +78,8 @@ impl Contraction {
         }
     }
 
-    /// One pass over all edges by cost. The costs of edges at a vertex that took part in a contraction are out of date, so
-    /// these wait for the next pass; and so do the dear ones, so that the order is nearly that of a queue.
+    /// One pass over all edges by cost. The costs of edges at a vertex that took part in a contraction are out of
+    /// date, so these wait for the next pass; and so do the dear ones, so that the order is nearly that of a queue.
     fn pass(&mut self, target: usize, limits: Limits) {
         let mut candidates = self.candidates();
         candidates.sort_unstable();

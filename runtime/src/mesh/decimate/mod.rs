@@ -16,8 +16,9 @@ pub struct DecimateOptions {
     /// Keep every boundary vertex. Default false: boundary vertices are contracted too, along the boundary only and by
     /// the error that this makes in its curve, so that a finely scanned rim gets no more than its share of vertices.
     pub lock_boundary: bool,
-    /// Weight of the distance a vertex moves, against its distance to the planes of the surface. From 0 (fewest vertices
-    /// where the surface is flat, in long triangles) to 1 (evenly spread), default 0.001: even enough for a good Laplacian.
+    /// Weight of the distance a vertex moves, against its distance to the planes of the surface. From 0 (fewest
+    /// vertices where the surface is flat, in long triangles) to 1 (evenly spread), default 0.001: even enough for a
+    /// good Laplacian.
     pub evenness: f64,
 }
 
@@ -69,11 +70,12 @@ pub enum DecimateError {
 /// handles and holes are kept and a manifold stays one. They make no fold and no sliver unless the target demands it.
 ///
 /// A mesh of no more vertices comes back as it is. More than `target` are left only where the topology does not allow
-/// fewer (4 for a sphere, 3 for each boundary, all of the boundary where it is locked), or where hardly an edge remains whose
-/// contraction makes no face of a height below 1e-4 of its longest side. Time is `O(n log n)`.
+/// fewer (4 for a sphere, 3 for each boundary, all of the boundary where it is locked), or where hardly an edge
+/// remains whose contraction makes no face of a height below 1e-4 of its longest side. Time is `O(n log n)`.
 ///
 /// # Errors
-/// For a mesh of more than `target` vertices, if `target` is below 4, an option is out of range, or the mesh is not manifold.
+/// For a mesh of more than `target` vertices, if `target` is below 4, an option is out of range, or the mesh is not
+/// manifold.
 pub fn decimate(mesh: &Mesh, target: usize, options: &DecimateOptions) -> Result<Decimated, DecimateError> {
     if mesh.n_vertices() <= target {
         return Ok(Decimated { mesh: mesh.clone(), injection: (0..mesh.n_vertices() as u32).collect() });

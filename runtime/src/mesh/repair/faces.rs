@@ -12,7 +12,8 @@ pub(crate) fn weld(mesh: &Mesh) -> Vec<u32> {
     mesh.vertices().iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
 }
 
-/// The faces, by index and welded vertices, that have an area and whose vertices no earlier face has; and those without area.
+/// The faces, by index and welded vertices, that have an area and whose vertices no earlier face has; and those
+/// without area.
 pub(super) fn proper_faces(
     mesh: &Mesh,
     welded: &[u32],

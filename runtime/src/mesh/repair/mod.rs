@@ -19,11 +19,12 @@ use thiserror::Error;
 #[serde(default)]
 #[non_exhaustive]
 pub struct RepairOptions {
-    /// Take vertices at one position, or on a boundary and 1e-5 of the bounding box's diagonal apart, as one where their
-    /// faces fit together. Default true.
+    /// Take vertices at one position, or on a boundary and 1e-5 of the bounding box's diagonal apart, as one where
+    /// their faces fit together. Default true.
     pub weld: bool,
     /// Drop connected components whose area is below this share of the largest component's. Range 0 (keep all) to 1,
-    /// default 0.01: such are buttons, teeth, eyes and debris of the scanner. Each would take an eigenfunction from the body.
+    /// default 0.01: such are buttons, teeth, eyes and debris of the scanner. Each would take an eigenfunction from
+    /// the body.
     pub min_component_area: f64,
 }
 
@@ -36,15 +37,16 @@ impl Default for RepairOptions {
 /// A mesh fit for the Laplacian, and how it relates to the input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Repaired {
-    /// An oriented manifold with boundary: each edge has one or two faces, each vertex one fan of faces and at least one.
+    /// An oriented manifold with boundary: each edge has one or two faces, each vertex one fan of faces and at least
+    /// one.
     pub mesh: Mesh,
-    /// For every input vertex its vertex in `mesh`, at its position or near it, `[n_input]`. `None`: it has no counterpart,
-    /// as no face that remains has a vertex there.
+    /// For every input vertex its vertex in `mesh`, at its position or near it, `[n_input]`. `None`: it has no
+    /// counterpart, as no face that remains has a vertex there.
     pub repaired_of_input: Vec<Option<u32>>,
     /// For every vertex of `mesh` an input vertex at the same position, `[n_repaired]`.
     pub input_of_repaired: Vec<u32>,
-    /// Input vertices without counterpart that have a place on the surface, ascending: all their faces were of tiny components or
-    /// without area.
+    /// Input vertices without counterpart that have a place on the surface, ascending: all their faces were of tiny
+    /// components or without area.
     pub dropped_vertices: Vec<u32>,
     /// What was done.
     pub report: RepairReport,
@@ -133,14 +135,14 @@ pub enum RepairError {
 
 /// Makes an oriented manifold with boundary of any mesh.
 ///
-/// In order: vertices at identical positions, and near ones on a boundary, are taken as one; faces without area and repeated faces go; sheets that
-/// meet in a non-manifold edge or vertex are cut apart there, each with a copy of the vertices; components that are tiny
-/// and vertices without a face go; faces are turned round to agree with their neighbours, and so that a closed surface
-/// has its normals outside.
+/// In order: vertices at identical positions, and near ones on a boundary, are taken as one; faces without area and
+/// repeated faces go; sheets that meet in a non-manifold edge or vertex are cut apart there, each with a copy of the
+/// vertices; components that are tiny and vertices without a face go; faces are turned round to agree with their
+/// neighbours, and so that a closed surface has its normals outside.
 ///
 /// Vertices are welded per fan: two vertices at one place become one only where edges join their faces around that
-/// position. Surfaces that merely touch stay apart, and a mesh in which nothing is wrong comes back bit for bit with the
-/// identity as its map.
+/// position. Surfaces that merely touch stay apart, and a mesh in which nothing is wrong comes back bit for bit with
+/// the identity as its map.
 ///
 /// Left alone are holes, self-intersections, the seam of a surface that cannot be oriented, and slivers that have some
 /// area: the Laplacian has to bear large cotangents of either sign there.

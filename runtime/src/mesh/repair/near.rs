@@ -1,4 +1,5 @@
-//! Vertices that are one but for rounding: of triangles that share no vertices, with noise; of seams that two programs wrote.
+//! Vertices that are one but for rounding: of triangles that share no vertices, with noise; of seams that two
+//! programs wrote.
 
 use super::faces::weld;
 use crate::Mesh;
@@ -12,7 +13,8 @@ const OF_EDGE: f64 = 0.25;
 
 /// For every vertex the first one at its position ([`weld`]) or, where both are on a boundary, near it.
 ///
-/// A mesh without boundary, or whose boundary vertices are all further apart, gets what [`weld`] gives. Time is linear in the size.
+/// A mesh without boundary, or whose boundary vertices are all further apart, gets what [`weld`] gives. Time is
+/// linear in the size.
 pub(crate) fn weld_near(mesh: &Mesh) -> Vec<u32> {
     let mut welded = weld(mesh);
     let within = tolerances(mesh, &welded);
@@ -48,8 +50,8 @@ fn tolerances(mesh: &Mesh, welded: &[u32]) -> Vec<f64> {
     within
 }
 
-/// The first vertices of their places, in a grid for each power of two of their tolerances. Those of a grid are further apart than
-/// half a cell, so that no cell holds more than a few.
+/// The first vertices of their places, in a grid for each power of two of their tolerances. Those of a grid are
+/// further apart than half a cell, so that no cell holds more than a few.
 struct Firsts<'a> {
     vertices: &'a [[f64; 3]],
     within: &'a [f64],
@@ -133,7 +135,8 @@ mod tests {
         assert_eq!(weld_near(&mesh), [0, 1, 2, 3, 4, 5]);
     }
 
-    /// A sheet that is tiny beside a vertex far away: all of its boundary is within the tolerance, and nothing of it is welded.
+    /// A sheet that is tiny beside a vertex far away: all of its boundary is within the tolerance, and nothing of it
+    /// is welded.
     #[test]
     fn a_vertex_far_away_costs_no_time() {
         let sheet = shapes::grid(300, 300);

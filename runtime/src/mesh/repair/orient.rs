@@ -4,8 +4,9 @@ use super::{RepairReport, Sheets};
 use crate::Mesh;
 use crate::mesh::{Topology, vec3};
 
-/// Which faces are to be turned round. In each component the orientation with the larger area stays, but where the component is
-/// closed, or nearly (its boundary is shorter than half the square root of its area), it encloses a positive volume.
+/// Which faces are to be turned round. In each component the orientation with the larger area stays, but where the
+/// component is closed, or nearly (its boundary is shorter than half the square root of its area), it encloses a
+/// positive volume.
 pub(super) fn orient(mesh: &Mesh, sheets: &Sheets, report: &mut RepairReport) -> Vec<bool> {
     let topology = Topology::of_faces(&sheets.faces, sheets.vertex_of_fan.len());
     let mut flipped = vec![None; sheets.faces.len()];

@@ -131,7 +131,8 @@ fn bowtie_keeps_the_vertex_on_the_larger_sphere() {
 
 #[test]
 fn spheres_that_touch_in_welded_places_stay_two() {
-    // Two cubes' worth of contact: a shared face between closed surfaces would be lost as a duplicate, a shared vertex not.
+    // Two cubes' worth of contact: a shared face between closed surfaces would be lost as a duplicate, a shared
+    // vertex not.
     let sphere = shapes::icosphere(1);
     let contact = sphere.vertices()[0];
     let identity = shapes::rotation([0.0, 0.0, 1.0], 0.0);

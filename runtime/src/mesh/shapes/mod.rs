@@ -33,7 +33,8 @@ pub fn zoo() -> Vec<(&'static str, Mesh)> {
     ]
 }
 
-/// The unit sphere: an icosahedron, each triangle split in four `subdivisions` times; `10 * 4^subdivisions + 2` vertices.
+/// The unit sphere: an icosahedron, each triangle split in four `subdivisions` times; `10 * 4^subdivisions + 2`
+/// vertices.
 pub fn icosphere(subdivisions: u32) -> Mesh {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     let mut vertices = Vec::new();

@@ -28,7 +28,8 @@ pub struct Topology<'a> {
     edge_of_half_edge: Vec<u32>,
 }
 
-/// The neighbours of every vertex, in compressed rows: those of `i` are `neighbors[offsets[i]..offsets[i + 1]]`, ascending.
+/// The neighbours of every vertex, in compressed rows: those of `i` are `neighbors[offsets[i]..offsets[i + 1]]`,
+/// ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Adjacency {
     /// `[n + 1]` row starts.
@@ -113,14 +114,14 @@ impl<'a> Topology<'a> {
         self.edges_where(|half_edges| half_edges.len() == 1)
     }
 
-    /// Edges of two faces that run along it in the same direction, so that one of the two is the wrong way round; as places
-    /// in [`Topology::edges`], ascending.
+    /// Edges of two faces that run along it in the same direction, so that one of the two is the wrong way round; as
+    /// places in [`Topology::edges`], ascending.
     pub fn inconsistent_edges(&self) -> Vec<u32> {
         self.edges_where(|h| h.len() == 2 && self.ends(h[0])[0] == self.ends(h[1])[0])
     }
 
-    /// Vertices with more than one fan of faces, where surfaces touch in a point. The ends of non-manifold edges are not
-    /// counted. Ascending.
+    /// Vertices with more than one fan of faces, where surfaces touch in a point. The ends of non-manifold edges are
+    /// not counted. Ascending.
     pub fn non_manifold_vertices(&self) -> Vec<u32> {
         let mut n_fans = vec![0u32; self.n_vertices];
         for &vertex in &self.fans().vertex_of_fan {
@@ -144,7 +145,8 @@ impl<'a> Topology<'a> {
         !self.edges.is_empty() && (0..self.edges.len()).all(|e| self.n_faces_of(e) == 2)
     }
 
-    /// Vertices minus edges plus faces, where only vertices of some face count. Closed and orientable of genus `g`: `2 - 2 g`.
+    /// Vertices minus edges plus faces, where only vertices of some face count. Closed and orientable of genus `g`:
+    /// `2 - 2 g`.
     pub fn euler_characteristic(&self) -> i64 {
         let mut used = vec![false; self.n_vertices];
         for &vertex in self.edges.iter().flatten() {

@@ -1,8 +1,8 @@
 //! Nearest neighbours from guesses, along the edges of two meshes.
 //!
-//! On a surface in a space of many dimensions distances fall towards the nearest point over many edges, so that a guess a few
-//! edges off leads to it. It costs some ten products a query, where a search costs as many as there are targets. The guesses come from
-//! samples of both meshes, which are compared with each other.
+//! On a surface in a space of many dimensions distances fall towards the nearest point over many edges, so that a
+//! guess a few edges off leads to it. It costs some ten products a query, where a search costs as many as there are
+//! targets. The guesses come from samples of both meshes, which are compared with each other.
 
 use super::SearchError;
 use super::kernels::Kernels;
@@ -11,7 +11,8 @@ use crate::mesh::{Adjacency, Mesh, Topology, farthest_point_sampling};
 use crate::point_map::PointMap;
 use rayon::prelude::*;
 
-/// Samples for each eigenfunction that maps are told by, and fewest samples: from 5 on maps are as good as those of all vertices.
+/// Samples for each eigenfunction that maps are told by, and fewest samples: from 5 on maps are as good as those of
+/// all vertices.
 const SAMPLES_OF_EACH: usize = 5;
 const FEWEST_SAMPLES: usize = 1000;
 
@@ -47,17 +48,18 @@ impl AlongEdges {
         Some([of(0)?, of(1)?])
     }
 
-    /// The area around each sample of source and target, of areas of their vertices: that of the vertices that follow it.
+    /// The area around each sample of source and target, of areas of their vertices: that of the vertices that follow
+    /// it.
     pub(crate) fn areas(&self, of_vertices: [&[f64]; 2]) -> [Vec<f64>; 2] {
         std::array::from_fn(|i| self.shapes[i].areas(of_vertices[i]))
     }
 
-    /// For each sample of the source a row of the target that none of its neighbours is nearer than, and the other way round; downhill
-    /// from the match before, and from the nearest of the other shape's samples.
+    /// For each sample of the source a row of the target that none of its neighbours is nearer than, and the other
+    /// way round; downhill from the match before, and from the nearest of the other shape's samples.
     ///
-    /// `queries` are the rows of the samples, `targets` those of all vertices of source and target. The queries of the source and the
-    /// target's rows are in one space, those of the target and the source's rows in one, which may be another one. The same for any number
-    /// of threads.
+    /// `queries` are the rows of the samples, `targets` those of all vertices of source and target. The queries of
+    /// the source and the target's rows are in one space, those of the target and the source's rows in one, which may
+    /// be another one. The same for any number of threads.
     ///
     /// # Errors
     /// If a set is empty, an entry is not finite, or the widths differ.
@@ -81,8 +83,9 @@ impl AlongEdges {
         Ok([of(0, target), of(1, source)])
     }
 
-    /// For each row of the source one of the target that none of its neighbours is nearer than, and the other way round; downhill from the
-    /// matches of the samples that the vertices around follow. Of equally near ones the lowest is taken. The same for any number of threads.
+    /// For each row of the source one of the target that none of its neighbours is nearer than, and the other way
+    /// round; downhill from the matches of the samples that the vertices around follow. Of equally near ones the
+    /// lowest is taken. The same for any number of threads.
     ///
     /// # Errors
     /// If a set is empty, an entry is not finite, or the widths differ.
@@ -162,8 +165,8 @@ fn nearest_by_edges(around: &Adjacency, samples: &[u32]) -> Vec<u32> {
     nearest.into_iter().map(|sample| if sample == NONE { 0 } else { sample }).collect()
 }
 
-/// For each row of `queries`, `[q, d]`, a row of `targets`, `[n, d]`, that none of its neighbours is nearer than: downhill from the best of
-/// what `guesses` gives for its index.
+/// For each row of `queries`, `[q, d]`, a row of `targets`, `[n, d]`, that none of its neighbours is nearer than:
+/// downhill from the best of what `guesses` gives for its index.
 fn climb(
     queries: &Rows,
     targets: &Rows,
@@ -213,7 +216,8 @@ mod tests {
         Matrix::from_fn(mesh.n_vertices(), 5, |i, j| lift(mesh.vertices()[i], j))
     }
 
-    /// The vertices of a lifted surface are found from samples as by a search through all, and so are the samples, whatever their guess.
+    /// The vertices of a lifted surface are found from samples as by a search through all, and so are the samples,
+    /// whatever their guess.
     #[test]
     fn samples_lead_to_the_nearest_row() {
         let source = bumpy_sphere(4, 1);

@@ -73,7 +73,8 @@ impl Kernels {
         inner_products, (rows: &[f32], vector: &[f32], products: &mut [f32])
     );
     dispatched!(
-        /// The lowest `squares[j] - products[j]`, and the lowest `j` that has it; infinity and 0 where none is below infinity.
+        /// The lowest `squares[j] - products[j]`, and the lowest `j` that has it; infinity and 0 where none is below
+        /// infinity.
         lowest_difference, (squares: &[f32], products: &[f32]) -> (f32, u32)
     );
     dispatched!(

@@ -1,8 +1,9 @@
 //! Nearest neighbours between two sets of rows in both directions at once, to single precision.
 //!
 //! One product of the two sets holds all inner products, and with the norms all distances: its rows have the nearest
-//! neighbours of one direction, its columns those of the other. That is faster than two searches where both directions are
-//! wanted and the sets are not large; distances that agree to single precision may be taken for one another.
+//! neighbours of one direction, its columns those of the other. That is faster than two searches where both
+//! directions are wanted and the sets are not large; distances that agree to single precision may be taken for one
+//! another.
 
 use super::kernels::Kernels;
 use super::{SearchError, check_finite};
@@ -15,8 +16,8 @@ use std::borrow::Cow;
 const ROWS: usize = 192;
 const COLUMNS: usize = 256;
 
-/// For each row `a_x` of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round; of equally
-/// near ones the lowest. The same for any number of threads.
+/// For each row `a_x` of `a`, `[n_a, d]`, the index of the nearest row of `b`, `[n_b, d]`, and the other way round;
+/// of equally near ones the lowest. The same for any number of threads.
 ///
 /// # Errors
 /// If a set is empty, an entry is not finite, or the widths differ.
@@ -47,8 +48,8 @@ pub(crate) fn squared_norms(rows: &Matrix) -> Vec<f64> {
     (0..rows.rows()).map(|i| rows.row(i).iter().map(|x| x * x).sum()).collect()
 }
 
-/// Rows in single precision, `[n, d]`, with half of their squared norms, or of what takes their place: the squared distance of a row
-/// `a_x` of one set and `b_y` of another is `2 (s_x + t_y - a_x . b_y)`.
+/// Rows in single precision, `[n, d]`, with half of their squared norms, or of what takes their place: the squared
+/// distance of a row `a_x` of one set and `b_y` of another is `2 (s_x + t_y - a_x . b_y)`.
 pub(crate) struct Rows<'a> {
     entries: Cow<'a, Matrix<f32>>,
     half_squares: Vec<f32>,

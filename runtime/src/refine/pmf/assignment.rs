@@ -7,7 +7,8 @@ use crate::point_map::PointMap;
 use crate::point_map::search::squared_distance;
 use rayon::prelude::*;
 
-/// A vertex goes without a match rather than take one that is worse than its worst candidate by so many squared spacings.
+/// A vertex goes without a match rather than take one that is worse than its worst candidate by so many squared
+/// spacings.
 const MARGIN: f64 = 100.0;
 /// The auction's precision, in squared spacings.
 const PRECISION: f64 = 0.0005;
@@ -75,8 +76,8 @@ impl<'a> Assigner<'a> {
         n_source <= self.rows.rows()
     }
 
-    /// The assignment of least squared distance between `averages`, `[n_source, k]`, and the embedding, in which no target is
-    /// taken twice and some vertices may be left without. `around` holds neighbours of the source vertices.
+    /// The assignment of least squared distance between `averages`, `[n_source, k]`, and the embedding, in which no
+    /// target is taken twice and some vertices may be left without. `around` holds neighbours of the source vertices.
     pub(super) fn assign(&self, averages: &Matrix, around: &Neighborhoods, present: &[u32]) -> Vec<u32> {
         let row = |x: usize| {
             let mut near = self.nearest(averages.row(x), x as u32, around, present);
@@ -113,8 +114,8 @@ impl<'a> Assigner<'a> {
 
     /// Targets near an average with their squared distances, nearest first, at least one.
     ///
-    /// The search begins where the neighbours of `x` go and then walks downhill; all targets are looked at where no neighbour
-    /// is matched.
+    /// The search begins where the neighbours of `x` go and then walks downhill; all targets are looked at where no
+    /// neighbour is matched.
     fn nearest(&self, average: &[f64], x: u32, around: &Neighborhoods, present: &[u32]) -> Vec<(u32, f64)> {
         let starts = around.of(x).iter().take(STARTS).map(|&v| present[v as usize]);
         let mut open: Vec<u32> = starts
@@ -145,8 +146,8 @@ impl<'a> Assigner<'a> {
         found
     }
 
-    /// Gives each unmatched source vertex a target that is free, near where its surroundings go as far as possible. There must
-    /// be enough targets.
+    /// Gives each unmatched source vertex a target that is free, near where its surroundings go as far as possible.
+    /// There must be enough targets.
     pub(super) fn fill(&self, averages: &Matrix, targets: &mut [u32]) {
         loop {
             let open: Vec<usize> =

@@ -1,14 +1,15 @@
-//! Sparse linear assignment by auction (Bertsekas 1992, "Auction algorithms for network flow problems"; Bertsekas and Castañon
-//! 1992, "A forward/reverse auction algorithm for asymmetric assignment problems").
+//! Sparse linear assignment by auction (Bertsekas 1992, "Auction algorithms for network flow problems"; Bertsekas and
+//! Castañon 1992, "A forward/reverse auction algorithm for asymmetric assignment problems").
 //!
-//! Persons bid for objects. Person `i` gains `a_ij` from object `j` and `r_i`, its reserve, from having none; the sum of gains
-//! is maximised. With prices `p_j` and profits `q_i` the auction keeps, for all `i` and `j`,
+//! Persons bid for objects. Person `i` gains `a_ij` from object `j` and `r_i`, its reserve, from having none; the sum
+//! of gains is maximised. With prices `p_j` and profits `q_i` the auction keeps, for all `i` and `j`,
 //!
 //! `q_i >= a_ij - p_j - e`,  `q_i >= r_i - e`,  `p_j >= 0`,
 //!
-//! with near equality where `j` is assigned to `i`, and ends with price 0 on every object that is left over. The sum is then
-//! within `n_persons e` of the optimum. Bidding alone (forward) leaves prices on objects that lost their person in an earlier
-//! phase of larger `e`; such objects then look for a person themselves (reverse), until their price is gone.
+//! with near equality where `j` is assigned to `i`, and ends with price 0 on every object that is left over. The sum
+//! is then within `n_persons e` of the optimum. Bidding alone (forward) leaves prices on objects that lost their
+//! person in an earlier phase of larger `e`; such objects then look for a person themselves (reverse), until their
+//! price is gone.
 
 use std::collections::VecDeque;
 
@@ -65,8 +66,8 @@ impl Gains {
 
 /// The object of each person, [`NONE`] where the person does better without, `[n_persons]`.
 ///
-/// `reserve`, `[n_persons]`, is what each person gains without an object. The result is within `n_persons * precision` of the
-/// optimum. Ties go to the entry that comes first.
+/// `reserve`, `[n_persons]`, is what each person gains without an object. The result is within
+/// `n_persons * precision` of the optimum. Ties go to the entry that comes first.
 pub(super) fn assign(gains: &Gains, reserve: &[f64], precision: f64) -> Vec<u32> {
     let mut auction = Auction::new(gains, reserve);
     let mut epsilon = auction.spread().max(precision);
@@ -162,7 +163,8 @@ impl<'a> Auction<'a> {
         })
     }
 
-    /// The object lowers its price until a person prefers it; returns the object that this person leaves, if that has a price.
+    /// The object lowers its price until a person prefers it; returns the object that this person leaves, if that has
+    /// a price.
     fn offer(&mut self, object: usize, epsilon: f64) -> Option<u32> {
         let (mut best, mut first, mut second) = (NONE, f64::NEG_INFINITY, 0.0f64);
         for (person, gain) in self.by_object.row(object) {

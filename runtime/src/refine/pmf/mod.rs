@@ -1,17 +1,17 @@
 //! The product manifold filter (Vestner, Litman, Rodolà, Bronstein and Cremers 2017; Vestner et al. 2017, "Efficient
 //! deformable shape correspondence via kernel matching").
 //!
-//! A map is a set of points `(x, T(x))` of the product of both shapes. The filter estimates their density with a kernel on each
-//! shape, `sum_x' K_source(x, x') K_target(T(x'), y)`, and takes the assignment of vertices to vertices that is densest in sum, a
-//! linear assignment problem; then again, with narrower kernels. Wrong matches that do not agree with their surroundings vanish,
-//! and the map becomes smooth and injective.
+//! A map is a set of points `(x, T(x))` of the product of both shapes. The filter estimates their density with a
+//! kernel on each shape, `sum_x' K_source(x, x') K_target(T(x'), y)`, and takes the assignment of vertices to
+//! vertices that is densest in sum, a linear assignment problem; then again, with narrower kernels. Wrong matches
+//! that do not agree with their surroundings vanish, and the map becomes smooth and injective.
 //!
-//! With `K_target` the heat kernel, `K_target(y, y') = b(y) . b(y')`, `b(y) = exp(-t Lambda / 2) psi(y)`, the density is the
-//! inner product of `b(y)` with the average of `b(T(x'))` by `K_source`; for a bijection, maximising it is minimising the squared
-//! distance between the two, which is what is done here. That makes two things possible that a dense payoff matrix does not:
-//! only the targets nearest to the average take part in the assignment, so that no multiscale scheme is needed; and the last
-//! rounds can average by an affine fit in the tangent plane instead of a positive kernel, which is not drawn towards
-//! densely sampled or shrunk regions and leaves a correct map as it is.
+//! With `K_target` the heat kernel, `K_target(y, y') = b(y) . b(y')`, `b(y) = exp(-t Lambda / 2) psi(y)`, the density
+//! is the inner product of `b(y)` with the average of `b(T(x'))` by `K_source`; for a bijection, maximising it is
+//! minimising the squared distance between the two, which is what is done here. That makes two things possible that a
+//! dense payoff matrix does not: only the targets nearest to the average take part in the assignment, so that no
+//! multiscale scheme is needed; and the last rounds can average by an affine fit in the tangent plane instead of a
+//! positive kernel, which is not drawn towards densely sampled or shrunk regions and leaves a correct map as it is.
 //!
 //! Where the meshes are given and turn out to be triangulated alike, the map follows the triangulation in the end.
 
@@ -37,14 +37,14 @@ use triangulation::carried_on;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PmfOptions {
-    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a kernel as
-    /// wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.
+    /// Diffusion time of the source's heat kernel in the first round, relative to the area. Above 0, default 3e-3: a
+    /// kernel as wide as a body's trunk. Wide kernels straighten a map that is wrong by smooth shifts.
     pub time_start: f64,
-    /// Diffusion time in the last round with a heat kernel, and that of the embeddings `b` in which neighbours are looked for and
-    /// the rounds without one compare. Above 0, at most `time_start`; default 3e-4.
+    /// Diffusion time in the last round with a heat kernel, and that of the embeddings `b` in which neighbours are
+    /// looked for and the rounds without one compare. Above 0, at most `time_start`; default 3e-4.
     pub time_end: f64,
-    /// Rounds with a heat kernel, of the same time on both shapes, the times in even steps of their logarithm. Range 0 and up,
-    /// 1 and up without `local_rounds`; default 6.
+    /// Rounds with a heat kernel, of the same time on both shapes, the times in even steps of their logarithm. Range
+    /// 0 and up, 1 and up without `local_rounds`; default 6.
     pub heat_rounds: usize,
     /// Rounds that average by an affine fit to the nearest vertices. Range 0 and up, default 3.
     pub local_rounds: usize,
@@ -52,19 +52,19 @@ pub struct PmfOptions {
     pub neighbors_start: usize,
     /// Vertices in an affine fit in the last of these rounds. Range 4 to `neighbors_start`, default 10.
     pub neighbors_end: usize,
-    /// Targets that a source vertex can be assigned to besides its present match: those nearest to where its surroundings go.
-    /// Range 1 and up, default 128; wide kernels need many.
+    /// Targets that a source vertex can be assigned to besides its present match: those nearest to where its
+    /// surroundings go. Range 1 and up, default 128; wide kernels need many.
     pub candidates: usize,
-    /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the descriptors of
-    /// neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
+    /// Weight of the descriptors, where there are any: that of the squared distance that is usual between the
+    /// descriptors of neighbours, against one squared distance between neighbours. Range 0 and up, default 0.5.
     pub descriptor_weight: f64,
-    /// Where the meshes are given: they are taken to be triangulated alike, as registrations of one template are, if the map can
-    /// be carried on from triangle to triangle so that at least this share of the source's edges goes to edges. That map then
-    /// is the result, exact whatever the shapes; it comes from the triangulation and says nothing about the filter. Range 0
-    /// to 1, default 0.95.
+    /// Where the meshes are given: they are taken to be triangulated alike, as registrations of one template are, if
+    /// the map can be carried on from triangle to triangle so that at least this share of the source's edges goes to
+    /// edges. That map then is the result, exact whatever the shapes; it comes from the triangulation and says
+    /// nothing about the filter. Range 0 to 1, default 0.95.
     pub alike: f64,
-    /// The source is a part of the target, in one unit: times are then relative to the area of the target for both. Default
-    /// false: to the area of each.
+    /// The source is a part of the target, in one unit: times are then relative to the area of the target for both.
+    /// Default false: to the area of each.
     pub part: bool,
 }
 
@@ -99,28 +99,28 @@ pub struct PmfHints<'a> {
 pub struct PmfInfo {
     /// The share of source vertices whose match changed in each round.
     pub changed: Vec<f64>,
-    /// Vertices without a match after the last round, as no candidate was left for them or a triangulation that was followed
-    /// does not reach them. They got what was free (source no larger than the target), or the nearest target, taken or not
-    /// (source larger).
+    /// Vertices without a match after the last round, as no candidate was left for them or a triangulation that was
+    /// followed does not reach them. They got what was free (source no larger than the target), or the nearest
+    /// target, taken or not (source larger).
     pub left_over: usize,
-    /// The share of the source's edges that go to edges of the target, where the map follows a triangulation that both meshes
-    /// have; `None` where they have none in common, or are not given.
+    /// The share of the source's edges that go to edges of the target, where the map follows a triangulation that
+    /// both meshes have; `None` where they have none in common, or are not given.
     pub edges_kept: Option<f64>,
 }
 
 /// Refines a point map by the product manifold filter.
 ///
-/// Where the source has no more vertices than the target the result is injective, hence a bijection where they have equally
-/// many. A larger source has the target's vertices assigned to its own instead, and its others go to the nearest target, taken or
-/// not. Source vertices without a match in `map` have one afterwards. The confidence is the cosine of the angle between `b(T(x))`
-/// and the last round's average around `x`.
+/// Where the source has no more vertices than the target the result is injective, hence a bijection where they have
+/// equally many. A larger source has the target's vertices assigned to its own instead, and its others go to the
+/// nearest target, taken or not. Source vertices without a match in `map` have one afterwards. The confidence is the
+/// cosine of the angle between `b(T(x))` and the last round's average around `x`.
 ///
-/// Needs a map that is right on the whole, such as ZoomOut's: the filter is local. 200 eigenfunctions are enough for shapes of
-/// 7000 vertices.
+/// Needs a map that is right on the whole, such as ZoomOut's: the filter is local. 200 eigenfunctions are enough for
+/// shapes of 7000 vertices.
 ///
 /// # Errors
-/// If an option is out of range, a basis has no eigenfunctions, descriptors or meshes are not those of the shapes, the map does
-/// not fit the bases or it matches nothing.
+/// If an option is out of range, a basis has no eigenfunctions, descriptors or meshes are not those of the shapes,
+/// the map does not fit the bases or it matches nothing.
 pub fn pmf(
     map: &PointMap,
     basis_source: &Eigenbasis,
@@ -186,7 +186,8 @@ impl Embedding {
 /// The map between rounds.
 struct Filter {
     targets: Vec<u32>,
-    /// The average around each source vertex of `b(T(x'))`, in rounds with a heat kernel of `psi(T(x'))`, `[n_source, k_target]`.
+    /// The average around each source vertex of `b(T(x'))`, in rounds with a heat kernel of `psi(T(x'))`,
+    /// `[n_source, k_target]`.
     averages: Matrix,
     changed: Vec<f64>,
 }

@@ -15,10 +15,11 @@ pub(super) struct Neighborhoods {
 }
 
 impl Neighborhoods {
-    /// The `size` rows of `embedding`, `[n, d]`, nearest to each row (all, if there are fewer), nearest first, ties by index.
+    /// The `size` rows of `embedding`, `[n, d]`, nearest to each row (all, if there are fewer), nearest first, ties
+    /// by index.
     ///
-    /// Looks at all pairs: a partition of the rows does not help, because heat kernels tell rows apart only at short range,
-    /// and all others are about equally far. Takes `8 BLOCK n` bytes for each thread.
+    /// Looks at all pairs: a partition of the rows does not help, because heat kernels tell rows apart only at short
+    /// range, and all others are about equally far. Takes `8 BLOCK n` bytes for each thread.
     pub(super) fn new(embedding: &Matrix, size: usize) -> Self {
         let n = embedding.rows();
         let size = size.min(n);

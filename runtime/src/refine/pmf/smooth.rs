@@ -30,8 +30,8 @@ impl LocalCharts {
         Self { charts: (0..embedding.rows() as u32).into_par_iter().map(chart).collect() }
     }
 
-    /// The average of `values[targets]` around each vertex, `[n, d]`: the value at the vertex of the affine function, of
-    /// the two coordinates, that fits those of its matched neighbours best. Zeros where no neighbour is matched.
+    /// The average of `values[targets]` around each vertex, `[n, d]`: the value at the vertex of the affine function,
+    /// of the two coordinates, that fits those of its matched neighbours best. Zeros where no neighbour is matched.
     pub(super) fn average(&self, values: &Matrix, targets: &[u32], unmatched: u32) -> Matrix {
         let mut averages = Matrix::zeros(self.charts.len(), values.cols());
         let width = values.cols().max(1);
@@ -59,7 +59,8 @@ impl Chart {
         Self { vertices: vertices.to_vec(), weights, coordinates: principal_coordinates(&rows, reach) }
     }
 
-    /// The weights with which the neighbours that are `usable` enter the affine fit's value at the vertex; they sum to 1.
+    /// The weights with which the neighbours that are `usable` enter the affine fit's value at the vertex; they sum
+    /// to 1.
     fn kernel(&self, usable: impl Fn(u32) -> bool) -> Vec<(f64, u32)> {
         let entries: Vec<(f64, [f64; 3], u32)> = (0..self.vertices.len())
             .filter(|&i| usable(self.vertices[i]))
@@ -96,7 +97,8 @@ fn first_row_of_inverse(m: &[[f64; 3]; 3]) -> [f64; 3] {
 
 /// Coordinates of the rows, `[m]`, along the two directions in which they extend most, in units of `sqrt(reach)`.
 ///
-/// By orthogonal iteration on the Gram matrix from its two pivots: the longest row, and the one that is longest without it.
+/// By orthogonal iteration on the Gram matrix from its two pivots: the longest row, and the one that is longest
+/// without it.
 fn principal_coordinates(rows: &[Vec<f64>], reach: f64) -> Vec<[f64; 2]> {
     let m = rows.len();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();

@@ -1,9 +1,9 @@
 //! A map carried on from triangle to triangle, where both meshes are triangulated alike.
 //!
-//! The filter leaves pieces that are right and pieces that are shifted by a vertex, and neither kernels nor descriptors can tell
-//! which is which. Where triangles of such a piece go to triangles, the triangulations can: across each edge of such a triangle
-//! lies one more triangle on either shape, whose third corners then correspond, and so on until all is reached. A shifted
-//! piece soon meets what it cannot go around.
+//! The filter leaves pieces that are right and pieces that are shifted by a vertex, and neither kernels nor
+//! descriptors can tell which is which. Where triangles of such a piece go to triangles, the triangulations can:
+//! across each edge of such a triangle lies one more triangle on either shape, whose third corners then correspond,
+//! and so on until all is reached. A shifted piece soon meets what it cannot go around.
 
 use crate::Mesh;
 use crate::mesh::UnionFind;
@@ -13,9 +13,9 @@ use std::collections::{HashMap, VecDeque};
 /// Pieces that are tried as the one to begin with, the largest first.
 const ATTEMPTS: usize = 8;
 
-/// The map of both meshes' triangulations that goes furthest from one of the pieces of `present`, and the share of the source's
-/// edges that go to edges by it. Vertices that it does not reach keep their match if no other took it, else are
-/// [`PointMap::UNMATCHED`].
+/// The map of both meshes' triangulations that goes furthest from one of the pieces of `present`, and the share of
+/// the source's edges that go to edges by it. Vertices that it does not reach keep their match if no other took it,
+/// else are [`PointMap::UNMATCHED`].
 pub(super) fn carried_on([source, target]: [&Mesh; 2], present: &[u32]) -> (Vec<u32>, f64) {
     let (source, target) = (Triangulation::new(source), Triangulation::new(target));
     let pieces = pieces(&source, &target, present);
@@ -42,7 +42,8 @@ pub(super) fn carried_on([source, target]: [&Mesh; 2], present: &[u32]) -> (Vec<
 struct Triangulation<'a> {
     faces: &'a [[u32; 3]],
     n_vertices: usize,
-    /// By the two ends of a half-edge, its triangle and that triangle's third corner; `None` where a half-edge has several.
+    /// By the two ends of a half-edge, its triangle and that triangle's third corner; `None` where a half-edge has
+    /// several.
     half_edges: HashMap<[u32; 2], Option<(u32, u32)>>,
 }
 

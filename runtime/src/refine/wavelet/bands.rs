@@ -1,8 +1,8 @@
 //! Meyer's wavelets on a spectrum.
 //!
-//! Six bands cover the eigenvalues from 0 to the largest: one scaling function for the lowest, five wavelets, each an octave
-//! above the one before. They overlap with the neighbouring ones only, and their squares sum to 1 everywhere, so that a signal
-//! is the sum of what it is in each band (a tight frame).
+//! Six bands cover the eigenvalues from 0 to the largest: one scaling function for the lowest, five wavelets, each an
+//! octave above the one before. They overlap with the neighbouring ones only, and their squares sum to 1 everywhere,
+//! so that a signal is the sum of what it is in each band (a tight frame).
 
 use crate::Matrix;
 use std::f64::consts::FRAC_PI_2;
@@ -12,10 +12,11 @@ pub(super) const BANDS: usize = 6;
 const WAVELETS: i32 = BANDS as i32 - 1;
 
 /// What is left of each entry of a functional map `[k_target, k_source]`, or of the transpose of one back:
-/// `sum_s g_s(mu_i) g_s(lambda_j)`, from 1 between equal eigenvalues down to 0 between those of bands that do not overlap.
+/// `sum_s g_s(mu_i) g_s(lambda_j)`, from 1 between equal eigenvalues down to 0 between those of bands that do not
+/// overlap.
 ///
-/// The eigenvalues, `[k_source]` and `[k_target]`, should be at unit area; the bands go up to the largest of all. The squares of
-/// the bands sum to 1, so that the filter needs no division by them.
+/// The eigenvalues, `[k_source]` and `[k_target]`, should be at unit area; the bands go up to the largest of all. The
+/// squares of the bands sum to 1, so that the filter needs no division by them.
 pub(super) fn filter_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]) -> Matrix {
     let largest = eigenvalues_source.iter().chain(eigenvalues_target).copied().fold(0.0, f64::max);
     let of_all =
@@ -26,11 +27,12 @@ pub(super) fn filter_mask(eigenvalues_source: &[f64], eigenvalues_target: &[f64]
     })
 }
 
-/// The bands at an eigenvalue of a spectrum up to `largest`, the scaling function first; eigenvalues below zero, which are
-/// rounded zeros, count as zero.
+/// The bands at an eigenvalue of a spectrum up to `largest`, the scaling function first; eigenvalues below zero,
+/// which are rounded zeros, count as zero.
 pub(super) fn bands(eigenvalue: f64, largest: f64) -> [f64; BANDS] {
     let relative = if largest > 0.0 { eigenvalue.max(0.0) / largest } else { 0.0 };
-    // At scale s the wavelet reaches from 2/3 to 8/3 in s lambda; the finest, s = 4 / (3 largest), peaks at the largest.
+    // At scale s the wavelet reaches from 2/3 to 8/3 in s lambda; the finest, s = 4 / (3 largest), peaks at the
+    // largest.
     let scaled = |octave: i32| 4.0 / 3.0 * f64::from(octave).exp2() * relative;
     std::array::from_fn(|band| match band as i32 {
         0 => scaling_function(scaled(WAVELETS - 1)),

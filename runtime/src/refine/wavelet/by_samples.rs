@@ -1,5 +1,5 @@
-//! Rounds in which only samples of both shapes are matched: their functional maps are those of all vertices but for little, at a fraction
-//! of the time. The last round matches all vertices.
+//! Rounds in which only samples of both shapes are matched: their functional maps are those of all vertices but for
+//! little, at a fraction of the time. The last round matches all vertices.
 
 use super::bands::filter_mask;
 use super::sampled::Sampled;

@@ -22,12 +22,14 @@ pub(super) struct Sampled<'a> {
     half_squares: Vec<f32>,
     /// Those of the samples, `[m, k + a]`.
     sample_rows: Matrix<f32>,
-    /// Takes values at the samples, `[m]`, to the coefficients of the function that fits them best, by the areas, `[k, m]`.
+    /// Takes values at the samples, `[m]`, to the coefficients of the function that fits them best, by the areas,
+    /// `[k, m]`.
     projection: Matrix,
 }
 
 impl<'a> Sampled<'a> {
-    /// Of the first `k` eigenfunctions of a basis, columns beside the embedding, `[n, a]`, and samples with the areas around them.
+    /// Of the first `k` eigenfunctions of a basis, columns beside the embedding, `[n, a]`, and samples with the areas
+    /// around them.
     pub(super) fn new(
         basis: &'a Eigenbasis,
         anchors: Option<&Matrix>,
@@ -85,8 +87,8 @@ impl<'a> Sampled<'a> {
         Matrix::from_vec(left.rows(), width, data)
     }
 
-    /// The rows of all vertices in the joint embedding, `[n, k + k_other + a]`: the eigenfunctions and their image, the target's coefficients
-    /// first, the source's, the columns.
+    /// The rows of all vertices in the joint embedding, `[n, k + k_other + a]`: the eigenfunctions and their image,
+    /// the target's coefficients first, the source's, the columns.
     pub(super) fn embedded(&self, image: &Matrix<f32>, is_target: bool) -> Matrix<f32> {
         let width = image.cols() + self.rows.cols();
         let mut data = Vec::with_capacity(image.rows() * width);

@@ -69,7 +69,8 @@ fn every_triangle_is_in_one_chart() {
             let side = |uv: Uv| uv[0].floor();
             let crossing = moved.iter().filter(|[a, b, c]| side(*a) != side(*b) || side(*a) != side(*c));
             assert_eq!(crossing.count(), 0, "from {} vertices", giver.n_vertices());
-            // The right chart: the one whose middle is on the triangle's side of the body, up to a triangle at its edges.
+            // The right chart: the one whose middle is on the triangle's side of the body, up to a triangle at its
+            // edges.
             let own = die(receiver);
             let wrong = moved.iter().zip(&own).filter(|(a, b)| side(a[0]) != side(b[0])).count();
             assert!(wrong < receiver.n_faces() / 4, "{wrong} triangles are in another chart");

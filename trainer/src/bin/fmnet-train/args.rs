@@ -50,7 +50,8 @@ pub(crate) enum Command {
     Train(Box<TrainArgs>),
     /// Write a checkpoint's network as a model file
     Export(ExportArgs),
-    /// Fit what the measures of a model's maps say of their error, on pairs with ground truth; for `export --calibration`
+    /// Fit what the measures of a model's maps say of their error, on pairs with ground truth; for
+    /// `export --calibration`
     Calibrate(CalibrateArgs),
     /// Match pairs of a dataset with one or several models, compare with the ground truth: tables, plots, a report
     Evaluate(EvaluateArgs),
@@ -116,7 +117,8 @@ pub(crate) enum Simulated {
     ///   fmnet-train train --dataset data/scans --out runs/scans -k 70 --sampling area --jitter 10
     #[command(verbatim_doc_comment)]
     Scans {
-        /// Registrations to scan: a folder of closed shapes that correspond vertex by vertex, such as FAUST's or SCAPE's
+        /// Registrations to scan: a folder of closed shapes that correspond vertex by vertex, such as FAUST's or
+        /// SCAPE's
         dataset: PathBuf,
         /// Folder for the scans
         out: PathBuf,
@@ -174,9 +176,9 @@ pub(crate) enum Simulated {
 
 #[derive(Debug, Args)]
 pub(crate) struct PreprocessArgs {
-    /// Dataset folders: FAUST registrations (tr_reg_NNN.ply), FAUST remeshed (tr_reg_NNN.off with corres/*.vts), FAUST
-    /// scans (scans/ and registrations/), SCAPE (meshNNN.off), TOSCA (CLASSn.off), SHREC'16 partial (null/ with holes/ or
-    /// cuts/), or any folder with a dataset.toml
+    /// Dataset folders: FAUST registrations (tr_reg_NNN.ply), FAUST remeshed (tr_reg_NNN.off with corres/*.vts),
+    /// FAUST scans (scans/ and registrations/), SCAPE (meshNNN.off), TOSCA (CLASSn.off), SHREC'16 partial (null/ with
+    /// holes/ or cuts/), or any folder with a dataset.toml
     #[arg(required = true)]
     pub(crate) datasets: Vec<String>,
     /// Folder for the results; pass the same to `train`
@@ -212,15 +214,16 @@ pub(crate) struct ExportArgs {
     /// Licence of the weights, for the metadata
     #[arg(long, default_value = "unspecified")]
     pub(crate) license: String,
-    /// Eigenfunctions of the functional map when meshes are matched, 1 to 500; raw maps often gain by more than in training
-    /// [default: as in training]
+    /// Eigenfunctions of the functional map when meshes are matched, 1 to 500; raw maps often gain by more than in
+    /// training [default: as in training]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Meshes of more vertices are decimated to so many when they are matched, 100 or more; 0: never [default: as in training]
+    /// Meshes of more vertices are decimated to so many when they are matched, 100 or more; 0: never [default: as in
+    /// training]
     #[arg(long, value_name = "N")]
     pub(crate) decimate: Option<usize>,
-    /// What turns the measures of a map into an estimate of its error, as `fmnet-train calibrate` writes it [default: the
-    /// program's own]
+    /// What turns the measures of a map into an estimate of its error, as `fmnet-train calibrate` writes it [default:
+    /// the program's own]
     #[arg(long, value_name = "FILE.json")]
     pub(crate) calibration: Option<PathBuf>,
     /// Source revision, for the metadata
@@ -265,8 +268,8 @@ pub(crate) struct EvaluateArgs {
     /// Compare SHOT without a network as well
     #[arg(long)]
     pub(crate) shot: bool,
-    /// Compare the map files of another method as well: its name and the folder of SOURCE__TARGET.txt (.vts, .npy, .npz,
-    /// .csv); may be given several times
+    /// Compare the map files of another method as well: its name and the folder of SOURCE__TARGET.txt (.vts, .npy,
+    /// .npz, .csv); may be given several times
     #[arg(long = "maps", value_name = "NAME=DIR", value_parser = named_folder)]
     pub(crate) maps: Vec<(String, PathBuf)>,
     /// Refinements to compare, separated by commas
@@ -287,7 +290,8 @@ pub(crate) struct EvaluateArgs {
     /// Eigenfunctions of the functional map, 1 to 500 [default: the model's; 120 with SHOT]
     #[arg(short, long, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub(crate) k: Option<u16>,
-    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with SHOT]
+    /// Solver of the functional map [default: bidirectional, or what the model was trained with; least-squares with
+    /// SHOT]
     #[arg(long, value_enum)]
     pub(crate) fm: Option<SolverKind>,
     /// Weight of the mask of the regularised solvers, 0 and up [default: 0.03 for bidirectional, else 0.1]

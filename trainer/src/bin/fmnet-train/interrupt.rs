@@ -12,7 +12,8 @@ pub(crate) fn stop() -> &'static AtomicBool {
     &STOP
 }
 
-/// Ends the program if the user asked for it: for work that has no order of its own to stop in, between two pieces of it.
+/// Ends the program if the user asked for it: for work that has no order of its own to stop in, between two pieces of
+/// it.
 pub(crate) fn end_if_asked() {
     if STOP.load(Ordering::Relaxed) {
         end();
@@ -24,8 +25,8 @@ fn end() -> ! {
     std::process::exit(INTERRUPTED.into());
 }
 
-/// Handles interrupts from here on. Where the command can `stop_in_order`, the first one asks it to (with a checkpoint); any other
-/// ends the program at once, after removing half-written files.
+/// Handles interrupts from here on. Where the command can `stop_in_order`, the first one asks it to (with a
+/// checkpoint); any other ends the program at once, after removing half-written files.
 pub(crate) fn watch(stop_in_order: bool) {
     let installed = ctrlc::set_handler(move || {
         if STOP.swap(true, Ordering::Relaxed) || !stop_in_order {

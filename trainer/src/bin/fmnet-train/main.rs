@@ -57,8 +57,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whether the program or the machine failed (a file that cannot be written, a step that went wrong), rather than the input or
-/// the options being wrong.
+/// Whether the program or the machine failed (a file that cannot be written, a step that went wrong), rather than the
+/// input or the options being wrong.
 fn is_own_failure(error: &anyhow::Error) -> bool {
     let unwritable = |io: &IoError| matches!(io, IoError::Write { .. });
     let of_training = |error: &TrainError| match error {

@@ -155,7 +155,8 @@ pub(crate) fn print_summary(summary: &Value) -> Result<(), IoError> {
     print_line(&format!("{summary:#}"))
 }
 
-/// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do without.
+/// A path for the summary: names that are not Unicode are shown with replacement characters, which JSON cannot do
+/// without.
 pub(crate) fn shown(path: &Path) -> String {
     path.display().to_string()
 }

@@ -1,4 +1,5 @@
-//! The network as ONNX operators: inputs are the shape's quantities, the wave kernel signature is computed in the graph.
+//! The network as ONNX operators: inputs are the shape's quantities, the wave kernel signature is computed in the
+//! graph.
 //!
 //! A channel is a row, `[width, n]`, as in the rest of the graph.
 

@@ -153,8 +153,8 @@ impl<T: Real> BlockContext<'_, T> {
         moments.iter().map(|moments| moments.normalizer(self.epsilon)).collect()
     }
 
-    /// Backward pass: `grad` enters as the gradient of the block's output and, with `to_input`, leaves as the gradient of
-    /// its input. The parameters' gradients are written to `flat`, ordered as the parameters.
+    /// Backward pass: `grad` enters as the gradient of the block's output and, with `to_input`, leaves as the
+    /// gradient of its input. The parameters' gradients are written to `flat`, ordered as the parameters.
     pub(super) fn backward(
         &self,
         parameters: BlockParameters<T>,

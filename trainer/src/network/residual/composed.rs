@@ -12,8 +12,8 @@ pub(super) struct Composed {
     pub(super) moments: Vec<[(Tensor, Tensor); 2]>,
 }
 
-/// Runs the network with `parameters` (flat) over `input` `[n, width]`, whose rows form `groups` unless `fixed` gives the
-/// moments.
+/// Runs the network with `parameters` (flat) over `input` `[n, width]`, whose rows form `groups` unless `fixed` gives
+/// the moments.
 pub(super) fn forward(
     options: &ResidualOptions,
     parameters: &Tensor,

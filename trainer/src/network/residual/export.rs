@@ -1,5 +1,5 @@
-//! The network as ONNX operators. Statistics of each shape stay in the graph, as `ReduceMean` over the vertices; trained
-//! statistics are folded into the linear layers.
+//! The network as ONNX operators. Statistics of each shape stay in the graph, as `ReduceMean` over the vertices;
+//! trained statistics are folded into the linear layers.
 
 use super::{Activation, Normalization, ResidualNetwork};
 use crate::export::{GraphBuilder, Parameters, axis, float, integer, integers};
@@ -72,7 +72,8 @@ fn vertex_mean(graph: &mut GraphBuilder, name: &str, x: &str) -> String {
     graph.node("ReduceMean", name, &[x], vec![axis(1), integer("keepdims", 1)])
 }
 
-/// A linear layer and the normalisation after it as one linear layer: `scale (x W - mean) / sqrt(variance + epsilon) + shift`.
+/// A linear layer and the normalisation after it as one linear layer:
+/// `scale (x W - mean) / sqrt(variance + epsilon) + shift`.
 fn folded(
     weight: &[f32],
     scale: &[f32],

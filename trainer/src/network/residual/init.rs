@@ -15,8 +15,8 @@ pub enum WeightInit {
     He,
 }
 
-/// Flat initial parameters of `blocks` residual blocks of width `width`: weights as `weight` says, shifts 0, scales 1, but
-/// `residual_scale` for the second normalisation of each block.
+/// Flat initial parameters of `blocks` residual blocks of width `width`: weights as `weight` says, shifts 0, scales
+/// 1, but `residual_scale` for the second normalisation of each block.
 pub(super) fn initialize(
     blocks: usize,
     width: usize,

@@ -1,11 +1,11 @@
 //! The paper's network: residual blocks on SHOT descriptors (section "Implementation details").
 //!
 //! Each block is `y = act(norm1(x W1))`, `out = act(x + norm2(y W2))`, with `x` `[n, width]` and weights
-//! `[width in, width out]`; there are no biases, which a normalisation would cancel. A normalisation maps each channel to
-//! mean 0 and variance 1, then multiplies it by a learnable scale and adds a learnable shift.
+//! `[width in, width out]`; there are no biases, which a normalisation would cancel. A normalisation maps each
+//! channel to mean 0 and variance 1, then multiplies it by a learnable scale and adds a learnable shift.
 //!
-//! All parameters live in one flat variable, in the order of [`Network::parameters`]; on the CPU the network is one fused
-//! op, elsewhere it is composed of Candle's ops.
+//! All parameters live in one flat variable, in the order of [`Network::parameters`]; on the CPU the network is one
+//! fused op, elsewhere it is composed of Candle's ops.
 
 mod block;
 mod composed;
@@ -45,8 +45,8 @@ pub enum Normalization {
     /// Over the vertices of each shape, in training and at test time, as the authors' code has it in effect.
     #[default]
     PerShape,
-    /// Over both shapes of a pair in training; at test time exponential averages of those, which an export folds into the
-    /// linear layers.
+    /// Over both shapes of a pair in training; at test time exponential averages of those, which an export folds into
+    /// the linear layers.
     Running,
 }
 
@@ -182,8 +182,8 @@ impl ResidualNetwork {
         &self.options
     }
 
-    /// The running statistics, `[blocks, 2]`: of each block, its two normalisations. Used with [`Normalization::Running`]
-    /// only.
+    /// The running statistics, `[blocks, 2]`: of each block, its two normalisations. Used with
+    /// [`Normalization::Running`] only.
     pub fn running_statistics(&self) -> &[[BatchMoments; 2]] {
         &self.running
     }

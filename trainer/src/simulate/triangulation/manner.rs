@@ -80,7 +80,8 @@ impl Manner {
 /// Rounds of remeshing: enough to forget the triangulation that it began with.
 const ROUNDS: usize = 6;
 
-/// A triangulation of about `target` vertices, of the original at most so many; `plain` is the surface before it was rounded.
+/// A triangulation of about `target` vertices, of the original at most so many; `plain` is the surface before it was
+/// rounded.
 pub(super) fn triangulate(
     manner: Manner,
     surface: &Surface,
@@ -145,8 +146,8 @@ fn marching(mesh: &Mesh, target: usize, rng: &mut ChaCha8Rng) -> Result<Mesh, Si
     }
 }
 
-/// The mesh itself, with some of its edges flipped and its vertices moved along the surface, so that its connectivity gives
-/// nothing away.
+/// The mesh itself, with some of its edges flipped and its vertices moved along the surface, so that its connectivity
+/// gives nothing away.
 fn shifted(
     surface: &Surface,
     mesh: &Mesh,

@@ -163,8 +163,9 @@ fn fitted(
     sizes.into_iter().zip(directions).map(metric).collect()
 }
 
-/// How much the surface bends around each direction, as a tensor `xx, xy, xz, yy, yz, zz` at each vertex, averaged around it. On a
-/// cylinder of radius r it is `a a^T / r`, a the axis (Cohen-Steiner and Morvan 2003, with the angles' absolute values).
+/// How much the surface bends around each direction, as a tensor `xx, xy, xz, yy, yz, zz` at each vertex, averaged
+/// around it. On a cylinder of radius r it is `a a^T / r`, a the axis (Cohen-Steiner and Morvan 2003, with the
+/// angles' absolute values).
 fn bends(surface: &Surface, topology: &Topology) -> Vec<[f64; 6]> {
     let mesh = surface.mesh;
     let mut tensors = vec![[0.0; 6]; mesh.n_vertices()];

@@ -1,8 +1,8 @@
 //! Other triangulations of a shape, as other people and programs would have made them, with points that correspond.
 //!
-//! The shape is rounded between its vertices, so that its facets are not seen, and sampled anew in one of several [`Manner`]s.
-//! Correspondences are points on the new surface where the shape's own points lie, whatever vertices are near: no
-//! connectivity, order or place of vertices tells which points correspond.
+//! The shape is rounded between its vertices, so that its facets are not seen, and sampled anew in one of several
+//! [`Manner`]s. Correspondences are points on the new surface where the shape's own points lie, whatever vertices are
+//! near: no connectivity, order or place of vertices tells which points correspond.
 
 mod manner;
 mod metric;
@@ -42,19 +42,19 @@ pub struct Triangulated {
     pub plan: Plan,
 }
 
-/// A point is missing where the new surface, before noise, is farther from it than this, relative to the mean edge length: it
-/// lies in a contact that has grown together, or on a part too thin for the triangles.
+/// A point is missing where the new surface, before noise, is farther from it than this, relative to the mean edge
+/// length: it lies in a contact that has grown together, or on a part too thin for the triangles.
 const NEAR: f64 = 0.3;
 /// Surfaces that come nearer than this grow together, relative to sqrt(area): least and most.
 const CONTACT: [f64; 2] = [0.008, 0.02];
 /// Spacing of the grid on which they do, relative to sqrt(area): least, and relative to an edge.
 const GRID: (f64, f64) = (0.0055, 0.5);
 
-/// A triangulation of `mesh`, whose `points` correspond with other shapes' points. `index` is the number of the shape: another
-/// one, another triangulation.
+/// A triangulation of `mesh`, whose `points` correspond with other shapes' points. `index` is the number of the
+/// shape: another one, another triangulation.
 ///
-/// The result is a manifold, but where holes, cuts and pieces meet in a vertex. Without noise, holes, cuts, contacts and pieces
-/// each point lies within 0.3 mean edge lengths of where it was, mostly far nearer.
+/// The result is a manifold, but where holes, cuts and pieces meet in a vertex. Without noise, holes, cuts, contacts
+/// and pieces each point lies within 0.3 mean edge lengths of where it was, mostly far nearer.
 ///
 /// # Errors
 /// If an option is out of range, or no surface is left of the mesh.

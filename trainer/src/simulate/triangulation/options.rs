@@ -121,8 +121,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan of shape number `index`, and the generator for carrying it out. A shape that is not `closed` has no inside:
-    /// nothing of it is glued, and it is not marched through.
+    /// The plan of shape number `index`, and the generator for carrying it out. A shape that is not `closed` has no
+    /// inside: nothing of it is glued, and it is not marched through.
     pub(super) fn draw(options: &TriangulationOptions, index: u64, closed: bool) -> (Self, ChaCha8Rng) {
         let mut rng = generator(options.seed, index);
         let shares: Vec<f64> = (options.manners.iter())

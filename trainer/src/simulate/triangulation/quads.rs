@@ -23,8 +23,9 @@ enum Diagonal {
     Random,
 }
 
-/// About four times as many vertices as `coarse`: its triangles are joined to quadrilaterals where that can be done well, and
-/// each polygon is divided into quadrilaterals around its middle (Catmull and Clark 1978, without their smoothing).
+/// About four times as many vertices as `coarse`: its triangles are joined to quadrilaterals where that can be done
+/// well, and each polygon is divided into quadrilaterals around its middle (Catmull and Clark 1978, without their
+/// smoothing).
 pub(super) fn quads(surface: &Surface, coarse: &Mesh, rng: &mut impl Rng) -> Mesh {
     let polygons = polygons(coarse);
     let mut places = surface.places(coarse);
@@ -172,7 +173,8 @@ fn split(places: &[Place], quads: &[[u32; 4]], rng: &mut impl Rng) -> Mesh {
             uprights[0].min(uprights[1])
         };
         let first = first == (upright(first) > 0.2 || upright(first) >= upright(!first));
-        // Two quadrilaterals alone around a corner share both of its edges; the diagonal between these would be the same edge.
+        // Two quadrilaterals alone around a corner share both of its edges; the diagonal between these would be the
+        // same edge.
         faces.extend(halves(first || around[a as usize] == 2));
     }
     let vertices = places.iter().map(|place| place.position).collect();

@@ -1,6 +1,6 @@
-//! Triangulations of a surface with edges as long as wanted: long edges are split, short ones collapsed, edges flipped until the
-//! triangles are Delaunay, and vertices moved along the surface (Botsch and Kobbelt, A remeshing approach to multiresolution
-//! modeling, 2004), all in the metric that is asked for.
+//! Triangulations of a surface with edges as long as wanted: long edges are split, short ones collapsed, edges
+//! flipped until the triangles are Delaunay, and vertices moved along the surface (Botsch and Kobbelt, A remeshing
+//! approach to multiresolution modeling, 2004), all in the metric that is asked for.
 
 use super::metric::Metric;
 use super::sheet::{Diamond, Sheet, cross};
@@ -22,8 +22,8 @@ const FLAT: f64 = 0.866;
 /// Share of the way to the middle of the triangles around it that a vertex goes in each round.
 const STEP: f64 = 0.7;
 
-/// A triangulation of about `target` vertices by the wanted edge lengths, relative to each other, at the surface's vertices; it
-/// begins with another triangulation.
+/// A triangulation of about `target` vertices by the wanted edge lengths, relative to each other, at the surface's
+/// vertices; it begins with another triangulation.
 pub(super) fn remesh(
     surface: &Surface,
     metrics: &[Metric],
@@ -134,7 +134,8 @@ impl Work<'_> {
         })
     }
 
-    /// Whether the triangle with its first corner moved to the place faces the way of the surface, or no worse than it did.
+    /// Whether the triangle with its first corner moved to the place faces the way of the surface, or no worse than
+    /// it did.
     fn stands(&self, face: [u32; 3], place: &Place, q: Vec3, r: Vec3) -> bool {
         let least = |normal: Vec3, at: [Vec3; 3]| {
             at.into_iter().map(|n| vec3::dot(normal, n)).fold(f64::INFINITY, f64::min)
@@ -220,7 +221,8 @@ impl Work<'_> {
     }
 }
 
-/// Whether the edge `a b` of the triangles `a b left` and `b a right` may become `left right` without changing the surface.
+/// Whether the edge `a b` of the triangles `a b left` and `b a right` may become `left right` without changing the
+/// surface.
 pub(super) fn flips_flat([a, b, left, right]: [Vec3; 4]) -> bool {
     let before = [[a, b, left], [b, a, right]].map(|t| unit(cross(t)));
     let after = [[left, a, right], [right, b, left]].map(|t| unit(cross(t)));

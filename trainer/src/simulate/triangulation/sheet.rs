@@ -18,7 +18,8 @@ pub(super) struct Sheet {
     fixed: Vec<bool>,
 }
 
-/// An edge between two faces: its ends `a`, `b`, and the third corners of the face that runs from `a` to `b` and of the other.
+/// An edge between two faces: its ends `a`, `b`, and the third corners of the face that runs from `a` to `b` and of
+/// the other.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Diamond {
     pub(super) a: u32,
@@ -122,9 +123,9 @@ impl Sheet {
         middle
     }
 
-    /// Whether contracting an edge keeps the surface a manifold of the same topology: the end that goes is not on the boundary,
-    /// no vertex but the two opposite the edge neighbours both of its ends (the link condition of Dey et al. 1999), and
-    /// neither of the two is left with two faces.
+    /// Whether contracting an edge keeps the surface a manifold of the same topology: the end that goes is not on the
+    /// boundary, no vertex but the two opposite the edge neighbours both of its ends (the link condition of Dey et
+    /// al. 1999), and neither of the two is left with two faces.
     pub(super) fn may_collapse(&self, edge: &Diamond) -> bool {
         if self.is_fixed(edge.a) {
             return false;

@@ -104,7 +104,8 @@ const HIP_HEIGHT: f64 = 0.925;
 const ARM: Vec3 = [0.766, -0.643, 0.0];
 const BACK_OF_HAND: Vec3 = [0.643, 0.766, 0.0];
 
-/// The body of a biped with the given proportions, and what it wears. Bodies of all proportions have the same first parts.
+/// The body of a biped with the given proportions, and what it wears. Bodies of all proportions have the same first
+/// parts.
 fn recipe(proportions: &Proportions, outfit: &Outfit) -> Recipe {
     let mut sculptor = Sculptor { recipe: Recipe::new(0.0092), to: *proportions };
     sculptor.bones();

@@ -1,6 +1,7 @@
 //! The body of a bird at rest: facing +z, its left at +x, the wings stretched out, the legs down.
 //!
-//! The trunk is modelled lying, then raised by the pitch of the species. Lengths are those of a bird with a trunk 0.25 long.
+//! The trunk is modelled lying, then raised by the pitch of the species. Lengths are those of a bird with a trunk
+//! 0.25 long.
 
 mod body;
 mod pose;

@@ -1,4 +1,5 @@
-//! A left hand at rest: the fingers up, slightly spread, the palm at +z, so the thumb at -x. Of the forearm there is a stump.
+//! A left hand at rest: the fingers up, slightly spread, the palm at +z, so the thumb at -x. Of the forearm there is
+//! a stump.
 //!
 //! Lengths are those of an adult's hand in metres.
 

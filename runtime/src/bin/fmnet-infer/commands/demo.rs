@@ -14,8 +14,8 @@ use std::path::Path;
 use std::slice;
 use std::time::Instant;
 
-/// A man and an ape in different poses, made by `fmnet-train synth --demo`; vertex i of one is the same point of the body as vertex i
-/// of the other, for i below [`CORRESPONDING`].
+/// A man and an ape in different poses, made by `fmnet-train synth --demo`; vertex i of one is the same point of the
+/// body as vertex i of the other, for i below [`CORRESPONDING`].
 const BODIES: [&[u8]; 2] =
     [include_bytes!("../../../../demo/source.ply"), include_bytes!("../../../../demo/target.ply")];
 const CORRESPONDING: u32 = 1000;

@@ -38,7 +38,8 @@ pub(crate) fn run(args: &FeaturesArgs, console: &Console) -> Result<()> {
     let vertices: Vec<i32> = (0..shape.n() as u32).map(|v| shape.way_back.input_of_work(v) as i32).collect();
     let n_input = shape.n_input();
     let unchanged = shape.n() == n_input && vertices.iter().enumerate().all(|(i, &v)| i == v as usize);
-    // Files of an earlier run must not be taken for those of this mesh, nor the files of an interrupted run for a whole set.
+    // Files of an earlier run must not be taken for those of this mesh, nor the files of an interrupted run for a
+    // whole set.
     files(&args.out).iter().try_for_each(|path| remove(path))?;
     let path = |quantity: Quantity| args.out.join(format!("{}.npy", quantity.name()));
     write_vector(&path(Quantity::Eigenvalues), &basis.eigenvalues)?;

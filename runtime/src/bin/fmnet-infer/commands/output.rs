@@ -54,7 +54,8 @@ pub(crate) fn check(outputs: &[PathBuf]) -> Result<()> {
     check_places(outputs)
 }
 
-/// Refuses outputs that could not be written: in a folder that does not exist or takes no files, the same file twice, a folder.
+/// Refuses outputs that could not be written: in a folder that does not exist or takes no files, the same file twice,
+/// a folder.
 pub(crate) fn check_places(outputs: &[PathBuf]) -> Result<()> {
     for (i, path) in outputs.iter().enumerate() {
         let folder = folder_of(path);

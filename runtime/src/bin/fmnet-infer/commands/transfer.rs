@@ -159,7 +159,8 @@ fn check_inputs(
     check_places(&written)
 }
 
-/// For each output the file of values that it is made from; `None` for a mesh. Refuses what could not be written, before any work.
+/// For each output the file of values that it is made from; `None` for a mesh. Refuses what could not be written,
+/// before any work.
 fn values_of_outputs(args: &TransferArgs) -> Result<Vec<Option<&PathBuf>>> {
     let mut values = args.values.iter();
     let of_output = |output: &PathBuf| {
