@@ -3,6 +3,7 @@
 mod blend;
 mod colormap;
 mod error;
+mod facing;
 mod fit;
 mod pair;
 mod picture;

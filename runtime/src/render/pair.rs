@@ -1,6 +1,7 @@
 //! Both shapes of a pair in one mesh, side by side, coloured by the map.
 
 use super::error::{RenderError, check_map};
+use super::facing::facing_alike;
 use super::{map_colors, position_colors};
 use crate::Mesh;
 use crate::io::Attributes;
@@ -8,13 +9,23 @@ use crate::point_map::PointMap;
 
 /// The source to the left of the target, brought to the same size, matches in the same colour.
 ///
-/// Vertices and faces of the source come first, each shape with a largest extent of 1.
+/// Vertices and faces of the source come first, each shape with a largest extent of 1. The target is turned by quarter
+/// turns about the axes where its matches face another way otherwise.
 ///
 /// # Errors
 /// If the map is not one of these meshes, a coordinate overflows, or both together have more vertices than 32-bit
 /// indices can name.
 pub fn side_by_side(source: &Mesh, target: &Mesh, map: &PointMap) -> Result<(Mesh, Attributes), RenderError> {
     check_map(map, source, target)?;
+    beside(source, &facing_alike(source, target, map)?, map)
+}
+
+/// [`side_by_side`], each shape as it is turned.
+pub(super) fn beside(
+    source: &Mesh,
+    target: &Mesh,
+    map: &PointMap,
+) -> Result<(Mesh, Attributes), RenderError> {
     let colors_target = position_colors(target);
     let mut colors = map_colors(map, &colors_target);
     colors.extend(colors_target);

@@ -1,6 +1,9 @@
 //! Pictures of meshes, drawn in software: no window, no graphics card.
 
-use super::{RenderError, side_by_side};
+use super::RenderError;
+use super::error::check_map;
+use super::facing::facing_alike;
+use super::pair::beside;
 use crate::Mesh;
 use crate::mesh::MeshError;
 use crate::point_map::PointMap;
@@ -23,7 +26,9 @@ const FILL: f64 = 0.94;
 const BACKGROUND: [u8; 3] = [255, 255, 255];
 
 /// Both shapes of a pair side by side, the source on the left, matches in the same colour: `width / 2` rows, 1 or
-/// more, twice as many columns. Errors as of [`side_by_side`].
+/// more, twice as many columns. The target faces as the source does. Errors as of [`side_by_side`].
+///
+/// [`side_by_side`]: super::side_by_side
 pub fn pair_picture(
     source: &Mesh,
     target: &Mesh,
@@ -31,8 +36,9 @@ pub fn pair_picture(
     width: usize,
 ) -> Result<Picture, RenderError> {
     let half = (width / 2).max(1);
-    let (left, right) = (turned(source)?, turned(target)?);
-    let (mesh, attributes) = side_by_side(&left, &right, map)?;
+    check_map(map, source, target)?;
+    let (left, right) = (turned(source)?, turned(&facing_alike(source, target, map)?)?);
+    let (mesh, attributes) = beside(&left, &right, map)?;
     Ok(picture(&mesh, &attributes.vertex_colors.unwrap_or_default(), 2 * half, half))
 }
 

@@ -2,6 +2,7 @@
 //! point to see its match. It opens from disk and needs no network.
 
 use super::error::{RenderError, check_map};
+use super::facing::facing_alike;
 use super::{map_colors, position_colors};
 use crate::Mesh;
 use crate::mesh::vec3;
@@ -29,13 +30,14 @@ pub struct ViewerPair<'a> {
     pub caption: &'a str,
 }
 
-/// The whole page.
+/// The whole page. The target is turned by quarter turns about the axes where it faces another way than the source.
 ///
 /// # Errors
 /// If the map is not one of these meshes.
 pub fn viewer_html(pair: &ViewerPair) -> Result<String, RenderError> {
     check_map(pair.map, pair.source, pair.target)?;
-    let colors_target = position_colors(pair.target);
+    let facing = facing_alike(pair.source, pair.target, pair.map)?;
+    let colors_target = position_colors(&facing);
     let colors_source = map_colors(pair.map, &colors_target);
     let targets: Vec<i32> = (0..pair.map.len()).map(|i| pair.map.get(i).map_or(-1, |t| t as i32)).collect();
     let doubt = pair.map.confidence.as_ref().map(|confidence| {
@@ -48,7 +50,7 @@ pub fn viewer_html(pair: &ViewerPair) -> Result<String, RenderError> {
         "title": pair.title,
         "caption": pair.caption,
         "source": shape(pair.name_source, pair.source, &colors_source),
-        "target": shape(pair.name_target, pair.target, &colors_target),
+        "target": shape(pair.name_target, &facing, &colors_target),
         "map": base64(bytemuck::cast_slice(&targets)),
     });
     // "</" would end the script element early.

@@ -22,6 +22,10 @@ pub(super) struct Extras {
     /// Size of a knot of hair, and how high it sits, from the nape (0) to the crown (1).
     bun: Option<[f64; 2]>,
     beard: Option<f64>,
+    /// Size of eyeballs that stand out, as in a cartoon.
+    eyeballs: Option<f64>,
+    /// Size of round ears, and how high they sit, from the sides of the head (0) to its top (1).
+    discs: Option<[f64; 2]>,
 }
 
 impl Extras {
@@ -36,7 +40,15 @@ impl Extras {
         let bag = draw(0.12, 0.8, 1.3);
         let bun = draw(0.2, 0.7, 1.3);
         let beard = draw(0.12, 0.5, 1.4);
-        Self { hood, collar, mittens, bag, bun: bun.map(|size| [size, uniform(rng, 0.0, 1.0)]), beard }
+        let bun = bun.map(|size| [size, uniform(rng, 0.0, 1.0)]);
+        Self { hood, collar, mittens, bag, bun, beard, ..Self::default() }
+    }
+
+    /// These, and what toys have of their own.
+    pub(super) fn of_toy(self, rng: &mut impl Rng) -> Self {
+        let eyeballs = chance(rng, 0.35).then(|| uniform(rng, 0.7, 1.6));
+        let discs = chance(rng, 0.35).then(|| [uniform(rng, 0.6, 2.6), uniform(rng, 0.0, 1.0)]);
+        Self { eyeballs, discs, ..self }
     }
 }
 
@@ -61,6 +73,30 @@ impl Sculptor {
         if let Some(size) = extras.beard {
             self.beard(size);
         }
+        if let Some(size) = extras.eyeballs {
+            (0..2).for_each(|side| self.eyeball(size, side));
+        }
+        if let Some(ears) = extras.discs {
+            (0..2).for_each(|side| self.disc(ears, side));
+        }
+    }
+
+    fn eyeball(&mut self, large: f64, side: usize) {
+        let size = HEAD_MAGNIFIED * self.to.head;
+        let join = Join { bones: &[bone::HEAD], blend: 0.005 * size };
+        let center = on_side(self.skull([0.03, 0.08, 0.088]), side);
+        self.recipe.ellipsoid(join, center, [0.026 * large * size; 3]);
+    }
+
+    /// A round ear that faces to the front.
+    fn disc(&mut self, [large, rise]: [f64; 2], side: usize) {
+        let size = HEAD_MAGNIFIED * self.to.head;
+        let join = Join { bones: &[bone::HEAD], blend: 0.008 * size };
+        let radius = 0.045 * large;
+        let root = lerp([0.074, 0.09, 0.0], [0.052, 0.165, 0.0], rise);
+        let out = lerp([0.8 * radius, 0.25 * radius, 0.0], [0.45 * radius, 0.7 * radius, 0.0], rise);
+        let center = on_side(self.skull(vec3::add(root, out)), side);
+        self.recipe.ellipsoid(join, center, vec3::scale([radius, radius, 0.016 + 0.12 * radius], size));
     }
 
     /// A hood around the back of the head, down to the shoulders.

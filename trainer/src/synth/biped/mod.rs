@@ -85,6 +85,10 @@ pub(super) static PLAN: Plan = Plan {
         let dressed = breed.varies && chance(rng, DRESSED);
         let outfit = if dressed { Outfit::random(rng) } else { Outfit::default() };
         let stylised = breed.varies && chance(rng, STYLISED);
+        if stylised && chance(rng, TOYS) {
+            let toy = proportions.as_toy(rng);
+            return recipe(&toy, &outfit.of_toy(rng));
+        }
         let proportions = if stylised { proportions.stylised(rng) } else { proportions };
         recipe(&proportions, &outfit)
     },
@@ -95,7 +99,9 @@ pub(super) static PLAN: Plan = Plan {
 /// Share of the breeds that wear something.
 const DRESSED: f64 = 0.3;
 /// Share of the breeds in proportions that nobody has.
-const STYLISED: f64 = 0.15;
+const STYLISED: f64 = 0.4;
+/// Share of these that are toys: still farther from what lives.
+const TOYS: f64 = 0.6;
 const HEAD_MAGNIFIED: f64 = 1.3;
 const HAND_MAGNIFIED: f64 = 1.65;
 const FOOT_MAGNIFIED: f64 = 1.2;

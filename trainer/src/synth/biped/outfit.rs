@@ -59,6 +59,11 @@ impl Outfit {
             extras: Extras::random(rng),
         }
     }
+
+    /// This one on a toy.
+    pub(super) fn of_toy(self, rng: &mut impl Rng) -> Self {
+        Self { extras: self.extras.of_toy(rng), ..self }
+    }
 }
 
 impl Sculptor {

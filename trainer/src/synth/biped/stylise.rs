@@ -1,8 +1,8 @@
-//! Bipeds as toys and cartoons have them: big heads, hands and feet, short or long limbs, no fingers or toes.
+//! Bipeds as games and toy makers have them: big heads, hands and feet, short or long limbs, no fingers or toes.
 
 use rand::Rng;
 
-use super::super::random::{chance, normal};
+use super::super::random::{chance, normal, uniform};
 use super::Proportions;
 
 impl Proportions {
@@ -35,5 +35,38 @@ impl Proportions {
             self.sock = 1.0;
         }
         self
+    }
+
+    /// Between this body and a toy: a head as large as the trunk, no neck, stumps for limbs.
+    pub(super) fn as_toy(self, rng: &mut impl Rng) -> Self {
+        let mut within = |low: f64, high: f64| uniform(rng, low, high);
+        let toy = Self {
+            head: within(1.4, 3.2),
+            head_width: within(0.9, 1.4),
+            ear: within(0.5, 3.0),
+            ear_rise: within(0.0, 1.0),
+            neck: within(0.8, 1.8),
+            neck_length: within(0.1, 0.9),
+            trunk: within(0.6, 1.1),
+            shoulders: within(0.65, 1.1),
+            chest: within(0.8, 1.4),
+            waist: within(0.8, 1.8),
+            hips: within(0.8, 1.4),
+            belly: within(0.0, 0.1),
+            muscle: within(0.5, 0.9),
+            arm_length: within(0.45, 1.0),
+            arm_girth: within(0.6, 2.0),
+            hand: within(0.7, 1.8),
+            leg_length: within(0.25, 0.9),
+            leg_girth: within(0.7, 2.0),
+            foot: within(0.9, 2.2),
+            muzzle: within(-0.5, 1.0).max(0.0),
+            snout: within(-0.8, 1.0).max(0.0),
+            ..self
+        };
+        let share = within(0.4, 1.0);
+        let grown = |together: f64, coin: f64| if coin < 0.6 { 1.0 } else { together };
+        let (mitten, sock) = (grown(self.mitten, within(0.0, 1.0)), grown(self.sock, within(0.0, 1.0)));
+        Self { mitten, sock, ..self.mixed(&toy, share) }
     }
 }

@@ -5,11 +5,13 @@
 mod head;
 mod legs;
 mod species;
+mod stylise;
 mod trunk;
 
 use super::gait;
 use super::math::Vec3;
 use super::proportions::proportions;
+use super::random::chance;
 use super::recipe::Recipe;
 use super::species::Plan;
 use fmnet::mesh::vec3;
@@ -75,11 +77,17 @@ pub(super) static PLAN: Plan = Plan {
     species: species::NAMES,
     held_out: Some("panther"),
     base: || recipe(&Proportions::default()),
-    breed: |breed, rng| recipe(&species::proportions(breed, rng)),
+    breed: |breed, rng| {
+        let proportions = species::proportions(breed, rng);
+        let toy = breed.varies && chance(rng, TOYS);
+        recipe(&if toy { proportions.as_toy(rng) } else { proportions })
+    },
     pose: |_, rng| gait::random_quadruped(rng),
     rest: |_, rng| gait::resting_quadruped(rng),
 };
 
+/// Share of the breeds in proportions that nothing alive has.
+const TOYS: f64 = 0.25;
 const HEAD_MAGNIFIED: f64 = 1.25;
 const PAW_MAGNIFIED: f64 = 1.25;
 /// Height of the elbow region, below which legs are stretched.
