@@ -90,6 +90,8 @@ class Quality(_NamedTuple):
     """Mean distance from a vertex to where the map there and back takes it, relative to sqrt(area)."""
     coverage: float
     """Share of the target's area that is matched."""
+    agreement: "float | None"
+    """Mean cosine between the model's descriptors of matches; None for parts and where SHOT alone is used."""
 
 
 class Refined(_NamedTuple):

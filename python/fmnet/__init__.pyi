@@ -59,6 +59,7 @@ class Quality(NamedTuple):
     reversed: float
     cycle: float | None
     coverage: float
+    agreement: float | None
 
 class Refined(NamedTuple):
     targets: NDArray[np.int32]

@@ -79,6 +79,7 @@ impl Match {
             quality.reversed,
             quality.cycle,
             quality.coverage,
+            quality.agreement,
         );
         named_tuple(py, "Quality", values)
     }

@@ -2,7 +2,8 @@
 //! are known.
 //!
 //! The logarithm of the error is fitted by ridge regression, the odds that a map is bad by logistic regression with
-//! the good and the bad maps of equal weight; both on [`Calibration::features`].
+//! the good and the bad maps of equal weight; both on [`Calibration::features`]. Beside these a map is doubtful whose
+//! descriptors agree less than those of nearly all good maps.
 
 use fmnet::quality::{Calibration, Quality};
 use thiserror::Error;
@@ -11,6 +12,8 @@ use thiserror::Error;
 pub const BAD: f64 = 0.1;
 /// Share of the good maps that may be called doubtful.
 const FALSE_ALARMS: f64 = 0.1;
+/// Share of the good maps whose descriptors may be called unlike.
+const UNLIKE: f64 = 0.02;
 /// Penalty on the squared weights: a few hundred maps do not determine correlated measures well.
 const RIDGE: f64 = 1.0;
 const WIDTH: usize = Calibration::WIDTH;
@@ -57,7 +60,7 @@ pub fn calibrate(maps: &[(Quality, f64)]) -> Result<Calibration, CalibrateError>
     let labels: Vec<(Weights, f64)> =
         rows.iter().map(|(x, error)| (*x, f64::from(u8::from(*error > BAD)))).collect();
     let bad = logistic(&labels);
-    let calibration = Calibration { error, bad, doubtful: 0.5 };
+    let calibration = Calibration { error, bad, doubtful: 0.5, agreement: None };
     let mut good: Vec<f64> = maps
         .iter()
         .filter(|(_, error)| *error <= BAD)
@@ -65,7 +68,16 @@ pub fn calibrate(maps: &[(Quality, f64)]) -> Result<Calibration, CalibrateError>
         .collect();
     good.sort_by(f64::total_cmp);
     let last_good = good[((1.0 - FALSE_ALARMS) * (good.len() - 1) as f64).round() as usize];
-    Ok(Calibration { doubtful: last_good.clamp(0.5, 0.95), ..calibration })
+    let agreement = least_agreement(maps);
+    Ok(Calibration { doubtful: last_good.clamp(0.5, 0.95), agreement, ..calibration })
+}
+
+/// The agreement of descriptors that few of the good maps fall short of; none where it is known of none of them.
+fn least_agreement(maps: &[(Quality, f64)]) -> Option<f64> {
+    let good = maps.iter().filter(|(_, error)| *error <= BAD);
+    let mut known: Vec<f64> = good.filter_map(|(quality, _)| quality.agreement).collect();
+    known.sort_by(f64::total_cmp);
+    known.get((UNLIKE * known.len() as f64) as usize).copied()
 }
 
 /// The weights that minimise `sum (w x - y)^2 + RIDGE |w|^2`, the constant unpenalised.
@@ -159,6 +171,7 @@ mod tests {
                 reversed: noisy(0.02 + error),
                 cycle: None,
                 coverage: 0.7,
+                agreement: Some(0.9 - error + 0.05 * (noisy(1.0) - 1.0)),
             };
             (quality, error)
         };

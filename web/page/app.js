@@ -191,6 +191,7 @@ function measures(s, memory) {
     ["Dirichlet energy (2 for an isometry)", number(q.dirichlet)],
     ["Distance from commuting with the Laplacians (0 to 1)", number(q.commutativity)],
     ["Distance from orthogonality", number(q.orthogonality)],
+    ...(q.agreement === null ? [] : [["Mean cosine between the descriptors of matches", number(q.agreement)]]),
     ...(q.cycle === null ? [] : [["There and back, relative to sqrt(area)", number(q.cycle)]]),
     ...(s.way === null ? [] : [["Way to the map", s.way]]),
     ["Memory of the module", size(memory)],

@@ -31,9 +31,20 @@ impl Judge<'_> {
     pub(super) fn judge(&self, found: &Found) -> Result<(Quality, Estimate), Error> {
         let [source, target] = self.sides();
         let quality = Quality::measure(&found.map, found.back.as_ref(), source, target)?;
+        let quality = self.with_descriptors(found, quality);
         let mut estimate = self.pair.matcher.calibration(self.pair.is_part()).estimate(&quality);
         estimate.doubtful |= self.is_torn_apart(found);
         Ok((quality, estimate))
+    }
+
+    /// With the agreement of a model's descriptors of wholes; along the borders of a part they are others than the
+    /// whole's, and cosines of SHOT depend on the triangulation.
+    fn with_descriptors(&self, found: &Found, quality: Quality) -> Quality {
+        if self.pair.is_part() || self.pair.matcher.network().is_none() {
+            return quality;
+        }
+        let [source, target] = [self.pair.source, self.pair.target].map(|shape| &shape.descriptors);
+        quality.with_descriptors(&found.map, &self.bases[0].mass, source, target)
     }
 
     /// Whether a map of wholes sends a region elsewhere. Regions of a part hang together by bridges between its
@@ -55,9 +66,13 @@ impl Judge<'_> {
 
     /// What looks most wrong with a map, in words.
     fn complaint(&self, found: &Found, quality: &Quality) -> &'static str {
-        match self.is_torn_apart(found) {
-            true => "parts of it are torn off, as where limbs are exchanged",
-            false => quality.complaint(),
+        let calibration = self.pair.matcher.calibration(self.pair.is_part());
+        if self.is_torn_apart(found) {
+            "parts of it are torn off, as where limbs are exchanged"
+        } else if calibration.sees_no_likeness(quality) {
+            "the model sees little likeness between what it matches, as where it does not know the kind of shape"
+        } else {
+            quality.complaint()
         }
     }
 

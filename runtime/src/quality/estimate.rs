@@ -16,6 +16,10 @@ pub struct Calibration {
     pub bad: [f64; Calibration::WIDTH],
     /// The probability from which a map is called doubtful.
     pub doubtful: f64,
+    /// The agreement of descriptors below which a map is doubtful whatever the other measures say; none for
+    /// descriptors whose cosines mean little.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<f64>,
 }
 
 /// What the measures say of a map's error.
@@ -38,6 +42,7 @@ impl Default for Calibration {
             error: [3.722, 0.178, 0.090, 0.221, 0.191, 0.150],
             bad: [10.927, 1.272, 0.489, 0.249, 0.346, 2.489],
             doubtful: 0.7,
+            agreement: None,
         }
     }
 }
@@ -52,6 +57,7 @@ impl Calibration {
             error: [4.594, 0.605, 0.095, 0.080, 0.108, 0.415],
             bad: [7.801, 2.426, 0.379, 0.321, 0.431, 1.665],
             doubtful: 0.3,
+            agreement: None,
         }
     }
 
@@ -84,10 +90,12 @@ impl Calibration {
     pub fn from_json(text: &str) -> Result<Self, String> {
         let calibration: Self = serde_json::from_str(text).map_err(|e| format!("does not parse ({e})"))?;
         let mut weights = calibration.error.iter().chain(&calibration.bad);
-        match weights.all(|w| w.is_finite()) && (0.0..=1.0).contains(&calibration.doubtful) {
+        let cosine = calibration.agreement.is_none_or(|least| (-1.0..=1.0).contains(&least));
+        match weights.all(|w| w.is_finite()) && (0.0..=1.0).contains(&calibration.doubtful) && cosine {
             true => Ok(calibration),
             false => {
-                Err("has a weight that is not finite, or a threshold that is no probability".to_string())
+                Err("has a weight that is not finite, a threshold that is no probability, or an agreement that is no cosine"
+                    .to_string())
             }
         }
     }
@@ -97,6 +105,12 @@ impl Calibration {
         let features = Self::features(quality);
         let linear = |weights: &[f64]| weights.iter().zip(features).map(|(w, x)| w * x).sum::<f64>();
         let bad = 1.0 / (1.0 + (-linear(&self.bad)).exp());
-        Estimate { expected_error: linear(&self.error).exp().min(100.0), bad, doubtful: bad >= self.doubtful }
+        let doubtful = bad >= self.doubtful || self.sees_no_likeness(quality);
+        Estimate { expected_error: linear(&self.error).exp().min(100.0), bad, doubtful }
+    }
+
+    /// Whether the descriptors of what is matched are too unlike.
+    pub fn sees_no_likeness(&self, quality: &Quality) -> bool {
+        matches!((quality.agreement, self.agreement), (Some(found), Some(least)) if found < least)
     }
 }

@@ -5,12 +5,14 @@
 //! every vertex; [`Calibration`] turns the measures into an estimate of the error. All measures are of the working
 //! meshes, where the map is found, and do not depend on scale, position or pose.
 
+mod agreement;
 mod doubt;
 mod estimate;
 mod regions;
 mod spectral;
 mod surface;
 
+use crate::Matrix;
 use crate::fmap::{FmapError, functional_map_of};
 use crate::mesh::Mesh;
 use crate::point_map::PointMap;
@@ -58,6 +60,10 @@ pub struct Quality {
     pub cycle: Option<f64>,
     /// Share of the target's area that is matched.
     pub coverage: f64,
+    /// Mean cosine between the descriptors of matches, by the area of the source, from -1 to 1; none where no
+    /// descriptors are known.
+    #[serde(default)]
+    pub agreement: Option<f64>,
 }
 
 impl Quality {
@@ -85,7 +91,20 @@ impl Quality {
             reversed: surface.reversed,
             cycle: back.map(|back| surface::cycle(map, back, source)),
             coverage: surface.coverage,
+            agreement: None,
         })
+    }
+
+    /// With the agreement of descriptors, a row for each vertex, `[n_source, d]` and `[n_target, d]`; rows of another
+    /// number say nothing.
+    pub fn with_descriptors(
+        self,
+        map: &PointMap,
+        areas: &[f64],
+        source: &Matrix<f32>,
+        target: &Matrix<f32>,
+    ) -> Self {
+        Self { agreement: agreement::measure(map, areas, source, target), ..self }
     }
 
     /// What looks most wrong, in words.

@@ -96,6 +96,30 @@ fn a_calibration_is_read_as_it_is_written() {
     assert!(Calibration::from_json("{}").unwrap_err().contains("does not parse"));
     let wrong = Calibration { doubtful: 2.0, ..calibration };
     assert!(Calibration::from_json(&wrong.to_json()).unwrap_err().contains("probability"));
+    let likeness = Calibration { agreement: Some(0.7), ..calibration };
+    assert_eq!(Calibration::from_json(&likeness.to_json()), Ok(likeness));
+    let wrong = Calibration { agreement: Some(1.5), ..calibration };
+    assert!(Calibration::from_json(&wrong.to_json()).unwrap_err().contains("cosine"));
+}
+
+/// A smooth map between what the descriptors hold for unlike is doubtful, though nothing else is wrong with it.
+#[test]
+fn a_map_without_likeness_is_doubtful() {
+    let source = Measured::new(bumpy_sphere(4, 2));
+    let n = source.mesh.n_vertices();
+    let right = Quality::measure(&identity(n), None, source.side(), source.side()).unwrap();
+    let areas = source.mesh.vertex_areas();
+    let [own, other] = [1.0, -0.2].map(|x: f32| Matrix::from_vec(n, 2, [1.0, x].repeat(n)));
+    let facing = Matrix::from_vec(n, 2, [0.1, 1.0].repeat(n));
+    let calibration = Calibration { agreement: Some(0.7), ..Calibration::default() };
+    let doubtful = |target: &Matrix<f32>, calibration: &Calibration| {
+        calibration.estimate(&right.with_descriptors(&identity(n), &areas, &own, target)).doubtful
+    };
+    assert!(
+        !doubtful(&own, &calibration) && doubtful(&other, &calibration) == doubtful(&facing, &calibration)
+    );
+    assert!(doubtful(&other, &calibration) && !doubtful(&other, &Calibration::default()));
+    assert!(!calibration.estimate(&right).doubtful);
 }
 
 /// Measures of maps of parts of a dog, of mean errors 38.4, 21.5, 2.1 and 1.3.
@@ -109,6 +133,7 @@ fn parts_have_a_calibration_of_their_own() {
         reversed,
         cycle: None,
         coverage: 0.4,
+        agreement: None,
     };
     let estimate = |measures| Calibration::of_parts().estimate(&quality(measures));
     let bad = [[0.241, 16.425, 0.382, 0.011, 0.156], [0.194, 9.138, 0.250, 0.012, 0.146]].map(estimate);

@@ -12,6 +12,15 @@ struct QuarterTurn {
     sign: [f64; 3],
 }
 
+type Vec3 = [f64; 3];
+
+/// A vertex of the source and its match.
+struct Match {
+    weight: f64,
+    source: Vec3,
+    target: Vec3,
+}
+
 /// Another side than the file's must match better by this share of what would be a perfect match.
 const CLEARLY: f64 = 0.05;
 
@@ -25,21 +34,24 @@ pub(super) fn facing_alike(source: &Mesh, target: &Mesh, map: &PointMap) -> Resu
 
 /// Sum over the matches of the products of coordinates, source by target, both from their means; weighted by the
 /// areas of the source, as if each shape's coordinates had deviation 1.
-fn covariance(source: &Mesh, target: &Mesh, map: &PointMap) -> [[f64; 3]; 3] {
-    let weights = source.vertex_areas();
-    let matches: Vec<_> = (0..map.len())
-        .filter_map(|i| Some((weights[i], source.vertices()[i], target.vertices()[map.get(i)? as usize])))
+fn covariance(source: &Mesh, target: &Mesh, map: &PointMap) -> [Vec3; 3] {
+    let areas = source.vertex_areas();
+    let matches: Vec<Match> = (0..map.len())
+        .filter_map(|i| {
+            let place = target.vertices()[map.get(i)? as usize];
+            Some(Match { weight: areas[i], source: source.vertices()[i], target: place })
+        })
         .collect();
-    let total: f64 = matches.iter().map(|m| m.0).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mean = |of: fn(&(f64, [f64; 3], [f64; 3])) -> [f64; 3]| {
-        let sum = matches.iter().fold([0.0; 3], |sum, m| vec3::add(sum, vec3::scale(of(m), m.0)));
+    let total: f64 = matches.iter().map(|m| m.weight).sum::<f64>().max(f64::MIN_POSITIVE);
+    let mean = |of: fn(&Match) -> Vec3| {
+        let sum = matches.iter().fold([0.0; 3], |sum, m| vec3::add(sum, vec3::scale(of(m), m.weight)));
         vec3::scale(sum, 1.0 / total)
     };
-    let (center, aim) = (mean(|m| m.1), mean(|m| m.2));
+    let middles = [mean(|m| m.source), mean(|m| m.target)];
     let mut products = [[0.0; 3]; 3];
     let mut squares = [0.0; 2];
-    for (weight, p, q) in &matches {
-        let (p, q) = (vec3::sub(*p, center), vec3::sub(*q, aim));
+    for Match { weight, source, target } in matches {
+        let (p, q) = (vec3::sub(source, middles[0]), vec3::sub(target, middles[1]));
         squares[0] += weight * vec3::dot(p, p);
         squares[1] += weight * vec3::dot(q, q);
         for (row, x) in products.iter_mut().zip(p) {
@@ -51,10 +63,9 @@ fn covariance(source: &Mesh, target: &Mesh, map: &PointMap) -> [[f64; 3]; 3] {
 }
 
 /// The quarter turn of the target that a covariance of source and target asks for.
-fn quarter_turn(covariance: &[[f64; 3]; 3]) -> QuarterTurn {
-    let gain = |turn: &QuarterTurn| -> f64 {
-        (0..3).map(|i| turn.sign[i] * covariance[i][turn.axis[i]]).sum()
-    };
+fn quarter_turn(covariance: &[Vec3; 3]) -> QuarterTurn {
+    let gain =
+        |turn: &QuarterTurn| -> f64 { (0..3).map(|i| turn.sign[i] * covariance[i][turn.axis[i]]).sum() };
     let all = QuarterTurn::all();
     let best = all.iter().fold(all[0], |best, turn| if gain(turn) > gain(&best) { *turn } else { best });
     if gain(&best) > gain(&all[0]) + CLEARLY { best } else { all[0] }
@@ -74,7 +85,7 @@ impl QuarterTurn {
         turns
     }
 
-    fn apply(&self, p: [f64; 3]) -> [f64; 3] {
+    fn apply(&self, p: Vec3) -> Vec3 {
         [0, 1, 2].map(|i| self.sign[i] * p[self.axis[i]])
     }
 }
@@ -87,7 +98,8 @@ mod tests {
     /// An ellipsoid with a bump, so that no two of its sides are alike.
     fn lopsided() -> Mesh {
         let sphere = icosphere(2);
-        let stretch = |p: &[f64; 3]| [3.0 * p[0] + p[1] * p[1], 2.0 * p[1] + 0.5 * p[2] * p[2], p[2] + 0.3 * p[0]];
+        let stretch =
+            |p: &[f64; 3]| [3.0 * p[0] + p[1] * p[1], 2.0 * p[1] + 0.5 * p[2] * p[2], p[2] + 0.3 * p[0]];
         Mesh::new(sphere.vertices().iter().map(stretch).collect(), sphere.faces().to_vec()).unwrap()
     }
 

@@ -126,7 +126,8 @@ fn toys_are_spheres_with_large_heads_and_the_landmarks_of_their_family() {
         let share = |breed: u64| {
             let template = Template::new(species(name), breed);
             let skeleton = &template.recipe.skeleton;
-            let on_head = |i: &&_| skeleton.bones[template.influences[**i as usize].strongest()].name == "head";
+            let on_head =
+                |i: &&_| skeleton.bones[template.influences[**i as usize].strongest()].name == "head";
             let known: Vec<u32> = template.landmarks.iter().copied().filter(|&i| i != UNMATCHED).collect();
             assert!(known.len() as f64 > 0.85 * template.n_landmarks() as f64, "{name} {breed}");
             let mesh = template.rest_mesh();
@@ -136,7 +137,10 @@ fn toys_are_spheres_with_large_heads_and_the_landmarks_of_their_family() {
         };
         let (typical, toy) = (share(0), share(seed + breed));
         println!("{name}: {typical:.2} {toy:.2}");
-        assert!(toy > 1.2 * typical, "{name}: {toy} of the vertices are on the head, of the typical body {typical}");
+        assert!(
+            toy > 1.2 * typical,
+            "{name}: {toy} of the vertices are on the head, of the typical body {typical}"
+        );
     }
 }
 
