@@ -7,6 +7,7 @@ use fmnet::geodesic::{GeodesicOptions, GeodesicSolver};
 use fmnet::io::{read_mesh, read_point_map};
 use fmnet::mesh::nearest_vertices;
 use fmnet::mesh::shapes::{bumpy_sphere, permuted};
+use fmnet::pipeline::{MatchOptions, Matcher};
 use fmnet::point_map::PointMap;
 use fmnet::quality::{Calibration, Quality, Side, SurfaceFrame, displaced_regions, doubt};
 use fmnet::spectral::{EigenOptions, Eigenbasis, Laplacian, eigenbasis};
@@ -68,6 +69,26 @@ fn unlike_shapes_are_doubtful_and_strict_says_so() {
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(summary["quality"]["doubtful"], true);
     assert_eq!(summary["candidates"].as_array().unwrap().len(), 1);
+}
+
+/// The built-in model carries the calibration beside it, and its descriptors agree on bodies, not on a ball and a man.
+#[test]
+fn descriptors_agree_where_the_model_knows_the_shapes() {
+    let own = Matcher::new(&MatchOptions::default()).unwrap().calibration(false);
+    let text = std::fs::read_to_string(root().join("models/bodies/calibration.json")).unwrap();
+    assert_eq!(Calibration::from_json(&text), Ok(own));
+    let limit = own.agreement.unwrap();
+    let work = Workplace::new();
+    work.mesh("man.ply", &man());
+    work.mesh("copy.ply", &permuted(&man(), 2).0);
+    work.mesh("ball.ply", &bumpy_sphere(4, 1));
+    let agreement = |source: &str| {
+        let found =
+            quality(&work, &["match", source, "man.ply", "-o", "map.txt", "--effort", "low", "--json"]);
+        found["agreement"].as_f64().unwrap()
+    };
+    let (copy, ball) = (agreement("copy.ply"), agreement("ball.ply"));
+    assert!(copy > 0.99 && ball < limit, "{copy} {ball}");
 }
 
 #[test]

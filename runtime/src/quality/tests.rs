@@ -109,15 +109,13 @@ fn a_map_without_likeness_is_doubtful() {
     let n = source.mesh.n_vertices();
     let right = Quality::measure(&identity(n), None, source.side(), source.side()).unwrap();
     let areas = source.mesh.vertex_areas();
+    // A cosine of .55.
     let [own, other] = [1.0, -0.2].map(|x: f32| Matrix::from_vec(n, 2, [1.0, x].repeat(n)));
-    let facing = Matrix::from_vec(n, 2, [0.1, 1.0].repeat(n));
     let calibration = Calibration { agreement: Some(0.7), ..Calibration::default() };
     let doubtful = |target: &Matrix<f32>, calibration: &Calibration| {
         calibration.estimate(&right.with_descriptors(&identity(n), &areas, &own, target)).doubtful
     };
-    assert!(
-        !doubtful(&own, &calibration) && doubtful(&other, &calibration) == doubtful(&facing, &calibration)
-    );
+    assert!(!doubtful(&own, &calibration));
     assert!(doubtful(&other, &calibration) && !doubtful(&other, &Calibration::default()));
     assert!(!calibration.estimate(&right).doubtful);
 }

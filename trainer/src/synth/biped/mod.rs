@@ -2,6 +2,8 @@
 //!
 //! Lengths are those of an adult 1.75 tall; a species scales regions of it.
 
+use std::ops::Range;
+
 use outfit::Outfit;
 
 mod extras;
@@ -15,7 +17,7 @@ mod trunk;
 use super::math::Vec3;
 use super::pose;
 use super::proportions::proportions;
-use super::random::chance;
+use super::random::{chance, uniform};
 use super::recipe::Recipe;
 use super::species::Plan;
 use fmnet::mesh::vec3;
@@ -84,13 +86,14 @@ pub(super) static PLAN: Plan = Plan {
         let proportions = species::proportions(breed, rng);
         let dressed = breed.varies && chance(rng, DRESSED);
         let outfit = if dressed { Outfit::random(rng) } else { Outfit::default() };
-        let stylised = breed.varies && chance(rng, STYLISED);
-        if stylised && chance(rng, TOYS) {
-            let toy = proportions.as_toy(rng);
-            return recipe(&toy, &outfit.of_toy(rng));
+        let style = if breed.varies { uniform(rng, 0.0, 1.0) } else { 1.0 };
+        if STYLISED.contains(&style) {
+            recipe(&proportions.stylised(rng), &outfit)
+        } else if TOYS.contains(&style) {
+            recipe(&proportions.as_toy(rng), &outfit.of_toy(rng))
+        } else {
+            recipe(&proportions, &outfit)
         }
-        let proportions = if stylised { proportions.stylised(rng) } else { proportions };
-        recipe(&proportions, &outfit)
     },
     pose: |skeleton, rng| pose::random_biped(skeleton, rng),
     rest: |skeleton, rng| pose::resting_biped(skeleton, rng),
@@ -98,10 +101,10 @@ pub(super) static PLAN: Plan = Plan {
 
 /// Share of the breeds that wear something.
 const DRESSED: f64 = 0.3;
-/// Share of the breeds in proportions that nobody has.
-const STYLISED: f64 = 0.4;
-/// Share of these that are toys: still farther from what lives.
-const TOYS: f64 = 0.6;
+/// Of numbers drawn from 0 to 1, those of breeds in proportions that nobody has.
+const STYLISED: Range<f64> = 0.0..0.15;
+/// Those of toys, still farther from what lives.
+const TOYS: Range<f64> = 0.45..0.7;
 const HEAD_MAGNIFIED: f64 = 1.3;
 const HAND_MAGNIFIED: f64 = 1.65;
 const FOOT_MAGNIFIED: f64 = 1.2;
