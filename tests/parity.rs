@@ -64,18 +64,11 @@ fn check(name: &str, network: &dyn Network, per_shape: bool, input: &Input) {
     check_javascript(&model, input, folder.path(), &agrees, expected.cols());
 }
 
-#[cfg(feature = "ort")]
 fn check_ort(model: &Path, input: &Input, agrees: &dyn Fn(&str, &Matrix<f32>)) {
     let Some(library) = fmnet_tests::onnxruntime_library() else { return };
     // SAFETY: set before the library is loaded, always to the same value.
     unsafe { std::env::set_var("ORT_DYLIB_PATH", library) };
     agrees("ort", &input.run(&DescriptorNetwork::load(model, Backend::Ort).unwrap()));
-}
-
-#[cfg(not(feature = "ort"))]
-fn check_ort(model: &Path, _: &Input, _: &dyn Fn(&str, &Matrix<f32>)) {
-    let error = DescriptorNetwork::load(model, Backend::Ort).unwrap_err().to_string();
-    assert!(error.contains("--features ort"), "{error}");
 }
 
 fn check_python(model: &Path, input: &Input, folder: &Path, agrees: &dyn Fn(&str, &Matrix<f32>)) {

@@ -84,6 +84,17 @@ fn shortened(program: &str, command: &str) -> &'static [&'static str] {
     }
 }
 
+/// The words of a command with two pairs where it asks for some.
+fn fewer_pairs(words: &Words) -> Words {
+    let mut fewer = words.clone();
+    for i in 1..fewer.len() {
+        if fewer[i - 1] == "--pairs" {
+            fewer[i] = "2".into();
+        }
+    }
+    fewer
+}
+
 /// Meshes that a page speaks of as the user's own, all of one connectivity, so that maps of some fit the others.
 fn provide_meshes(work: &Workplace, words: &Words) {
     let is_mesh = |word: &&String| [".ply", ".obj", ".glb", ".off"].iter().any(|e| word.ends_with(e));
@@ -92,7 +103,7 @@ fn provide_meshes(work: &Workplace, words: &Words) {
         let wanted = is_mesh(&word) && !is_output && !work.path(word).exists();
         is_output = word == "-o";
         if wanted {
-            work.mesh(word, &bumpy_sphere(3, seed as u64));
+            work.mesh(word, &bumpy_sphere(2, seed as u64));
         }
     }
 }
@@ -131,10 +142,10 @@ fn execute(work: &Workplace, words: &Words) -> bool {
         provide_meshes(work, &["a.ply".into(), "b.ply".into()].into());
     }
     if words.iter().any(|w| w == "landmarks.txt") {
-        std::fs::write(work.path("landmarks.txt"), "0 0\n200 200\n").unwrap();
+        std::fs::write(work.path("landmarks.txt"), "0 0\n100 100\n").unwrap();
     }
     let name = rest.first().map_or("", String::as_str);
-    command.args(&rest).args(shortened(&words[0], name)).current_dir(work.folder());
+    command.args(fewer_pairs(&rest)).args(shortened(&words[0], name)).current_dir(work.folder());
     run(&mut command).unwrap_or_else(|e| panic!("{}: {e}", words.join(" ")));
     true
 }

@@ -3,6 +3,7 @@
 
 use candle_core::Device;
 use fmnet::network::{Backend, DescriptorNetwork};
+use fmnet::quality::Calibration;
 use fmnet_trainer::checkpoint::Checkpoint;
 use fmnet_trainer::config::{List, TrainConfig};
 use fmnet_trainer::events::TrainEvent;
@@ -80,15 +81,23 @@ fn a_model_file_starts_a_run_as_its_checkpoint_does() {
     let network_of = checkpoint.network(&Device::Cpu).unwrap();
     export(network_of.as_ref(), &metadata(&checkpoint, &ModelOrigin::default()), &model).unwrap();
 
-    let other_k = folder.path().join("other_k.onnx");
-    let k_of = |path: &Path| DescriptorNetwork::load(path, Backend::default()).unwrap().metadata().k;
-    let exported = fmnet_tests::train()
-        .arg("export")
-        .args([&first.out, Path::new("-o"), &other_k])
-        .args(["-k", "15", "--quiet"])
-        .status();
-    assert!(exported.unwrap().success());
-    assert_eq!([k_of(&model), k_of(&other_k)], [first.k, 15]);
+    let (other, fitted) = (folder.path().join("other.onnx"), folder.path().join("fitted.json"));
+    let calibration = Calibration { doubtful: 0.6, agreement: Some(0.8), ..Calibration::default() };
+    let exported = |calibration: &str| {
+        std::fs::write(&fitted, calibration).unwrap();
+        let mut export = fmnet_tests::train();
+        export.arg("export").args([&first.out, Path::new("-o"), &other]).args(["-k", "15", "--quiet"]);
+        export.arg("--calibration").arg(&fitted).output().unwrap()
+    };
+    let unlikely = calibration.to_json().replace("0.8", "1.8");
+    assert_eq!(exported(&unlikely).status.code(), Some(2));
+    assert!(!other.exists());
+    assert!(exported(&calibration.to_json()).status.success());
+    let of = |path: &Path| {
+        let network = DescriptorNetwork::load(path, Backend::default()).unwrap();
+        (network.metadata().k, network.metadata().calibration)
+    };
+    assert_eq!([of(&model), of(&other)], [(first.k, None), (15, Some(calibration))]);
 
     let started = |initial: &Path, name: &str, network: &DiffusionOptions| TrainConfig {
         initial: initial.to_path_buf(),

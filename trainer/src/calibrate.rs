@@ -200,6 +200,17 @@ mod tests {
     }
 
     #[test]
+    fn few_of_the_good_maps_agree_less_than_the_limit() {
+        let maps = maps(600);
+        let least = calibrate(&maps).unwrap().agreement.unwrap();
+        let good: Vec<&Quality> = maps.iter().filter(|(_, error)| *error <= BAD).map(|(q, _)| q).collect();
+        let below = good.iter().filter(|quality| quality.agreement.unwrap() < least).count();
+        assert_eq!(below, (UNLIKE * good.len() as f64) as usize);
+        let unknown = maps.into_iter().map(|(quality, error)| (Quality { agreement: None, ..quality }, error));
+        assert_eq!(calibrate(&unknown.collect::<Vec<_>>()).unwrap().agreement, None);
+    }
+
+    #[test]
     fn systems_are_solved() {
         let mut matrix = penalty();
         matrix[0] = [2.0, 1.0, 0.0, 0.0, 0.0, 0.0];
