@@ -22,6 +22,21 @@ def colors_of(vertices):
     return 0.15 + 0.8 * (vertices - low) / (high - low)
 
 
+def broadside(vertices):
+    """The turn [3, 3] after which a mesh is seen along the axis that it is thinnest in, with y or z of its file up."""
+    thin = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2][2]
+    up = np.eye(3)[1 if abs(thin[1]) <= abs(thin[2]) + 0.1 else 2]
+    across = np.cross(up, thin)
+    across /= np.linalg.norm(across)
+    return np.array([across, np.cross(thin, across), thin])
+
+
+def facing_as(points, matches):
+    """The turn [3, 3] of points [n, 3] that is nearest to their matches [n, 3], from which files may differ by their axes."""
+    u, _, vt = np.linalg.svd((matches - matches.mean(axis=0)).T @ (points - points.mean(axis=0)))
+    return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+
+
 def draw(axes, vertices, faces, colors, title):
     """Draws a mesh of coloured triangles, seen from the front (z towards the viewer, y up)."""
     x, y, z = vertices[:, 0], -vertices[:, 2], vertices[:, 1]
@@ -60,9 +75,14 @@ def main():
     matched = match.targets[source.input_vertices]
     source_colors = np.where((matched >= 0)[:, None], colors[matched], 0.5)
 
+    place = np.zeros((match.n_target, 3))
+    place[target.input_vertices] = target.vertices
+    turn = broadside(target.vertices)
+    source_turn = turn @ facing_as(source.vertices[matched >= 0], place[matched[matched >= 0]])
+
     figure, axes = plt.subplots(1, 2, figsize=(8, 4.5), subplot_kw={"projection": "3d"})
-    draw(axes[0], source.vertices, source.faces, source_colors, source.name)
-    draw(axes[1], target.vertices, target.faces, colors[target.input_vertices], target.name)
+    draw(axes[0], source.vertices @ source_turn.T, source.faces, source_colors, source.name)
+    draw(axes[1], target.vertices @ turn.T, target.faces, colors[target.input_vertices], target.name)
     figure.subplots_adjust(left=0, right=1, bottom=0, top=0.92, wspace=0)
     figure.savefig(arguments.out, dpi=150)
     print(f"{(match.targets >= 0).sum()} of {match.n_source} vertices matched; {arguments.out} written")
