@@ -103,7 +103,7 @@ fn provide_meshes(work: &Workplace, words: &Words) {
         let wanted = is_mesh(&word) && !is_output && !work.path(word).exists();
         is_output = word == "-o";
         if wanted {
-            work.mesh(word, &bumpy_sphere(2, seed as u64));
+            work.mesh(word, &bumpy_sphere(3, seed as u64));
         }
     }
 }
@@ -142,7 +142,7 @@ fn execute(work: &Workplace, words: &Words) -> bool {
         provide_meshes(work, &["a.ply".into(), "b.ply".into()].into());
     }
     if words.iter().any(|w| w == "landmarks.txt") {
-        std::fs::write(work.path("landmarks.txt"), "0 0\n100 100\n").unwrap();
+        std::fs::write(work.path("landmarks.txt"), "0 0\n200 200\n").unwrap();
     }
     let name = rest.first().map_or("", String::as_str);
     command.args(fewer_pairs(&rest)).args(shortened(&words[0], name)).current_dir(work.folder());
