@@ -206,7 +206,8 @@ mod tests {
         let good: Vec<&Quality> = maps.iter().filter(|(_, error)| *error <= BAD).map(|(q, _)| q).collect();
         let below = good.iter().filter(|quality| quality.agreement.unwrap() < least).count();
         assert_eq!(below, (UNLIKE * good.len() as f64) as usize);
-        let unknown = maps.into_iter().map(|(quality, error)| (Quality { agreement: None, ..quality }, error));
+        let unknown =
+            maps.into_iter().map(|(quality, error)| (Quality { agreement: None, ..quality }, error));
         assert_eq!(calibrate(&unknown.collect::<Vec<_>>()).unwrap().agreement, None);
     }
 
