@@ -8,7 +8,7 @@ use fmnet::descriptor::{ShotOptions, shot};
 use fmnet::io::{read_matrix, write_matrix, write_vector};
 use fmnet::mesh::shapes::{bumpy_sphere, torus};
 use fmnet::network::contract::Quantity;
-use fmnet::network::{Backend, DescriptorNetwork};
+use fmnet::network::{Backend, DescriptorNetwork, NetworkError};
 use fmnet_tests::{javascript, python, relative_difference, root, run, test_metadata};
 use fmnet_trainer::dataset::{Correspondence, ShapeEntry, Split};
 use fmnet_trainer::export::export;
@@ -69,6 +69,13 @@ fn check_ort(model: &Path, input: &Input, agrees: &dyn Fn(&str, &Matrix<f32>)) {
     // SAFETY: set before the library is loaded, always to the same value.
     unsafe { std::env::set_var("ORT_DYLIB_PATH", library) };
     agrees("ort", &input.run(&DescriptorNetwork::load(model, Backend::Ort).unwrap()));
+}
+
+/// What is built here has every back-end; what a build without one says is kept in words.
+#[test]
+fn a_build_without_a_back_end_names_the_feature() {
+    let error = NetworkError::BackendAbsent { backend: Backend::Ort }.to_string();
+    assert!(error.contains("--features ort"), "{error}");
 }
 
 fn check_python(model: &Path, input: &Input, folder: &Path, agrees: &dyn Fn(&str, &Matrix<f32>)) {

@@ -32,7 +32,7 @@ def broadside(vertices):
 
 
 def facing_as(points, matches):
-    """The turn [3, 3] of points [n, 3] that is nearest to their matches [n, 3], from which files may differ by their axes."""
+    """The turn [3, 3] of points [n, 3] that is nearest to their matches [n, 3]: files differ in which axis is up."""
     u, _, vt = np.linalg.svd((matches - matches.mean(axis=0)).T @ (points - points.mean(axis=0)))
     return u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
 
